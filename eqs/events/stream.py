@@ -1,0 +1,170 @@
+"""The event stream type that every other part of the package speaks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FIELDS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Events:
+    """A time-sorted stream of events from one sensor.
+
+    Convention: `t` is int64 microseconds on the recording's own clock, windows are half-open
+    `[start, stop)`, `p` is 1 where the pixel became brighter and 0 where it became darker, `x`
+    counts columns from the left and `y` rows from the top.
+
+    Args:
+        t: time of each event, int64 microseconds, never decreasing, shape (n,).
+        x: column, uint16, smaller than `width`, shape (n,).
+        y: row, uint16, smaller than `height`, shape (n,).
+        p: polarity, uint8, 0 or 1, shape (n,).
+        height: rows of the sensor.
+        width: columns of the sensor.
+
+    Raises:
+        ValueError: a field has the wrong type or length, time runs backwards, a coordinate lies
+            outside the sensor, or a polarity is neither 0 nor 1.
+
+    Example:
+        >>> events = Events.from_arrays(t=[5, 9], x=[0, 1], y=[2, 2], p=[1, 0], height=4, width=4)
+        >>> len(events), len(events.window(5, 9))
+        (2, 1)
+    """
+
+    t: NDArray[np.int64]
+    x: NDArray[np.uint16]
+    y: NDArray[np.uint16]
+    p: NDArray[np.uint8]
+    height: int
+    width: int
+
+    def __post_init__(self) -> None:
+        """Check everything the rest of the package may then rely on."""
+        for name, dtype in FIELDS.items():
+            array = getattr(self, name)
+            if not isinstance(array, np.ndarray) or array.dtype != dtype or array.ndim != 1:
+                found = getattr(array, "dtype", type(array).__name__)
+                raise ValueError(
+                    f"Expected events.{name} to be a 1-D {np.dtype(dtype)} array, got {found}; "
+                    "use Events.from_arrays to convert"
+                )
+        lengths = {name: len(getattr(self, name)) for name in FIELDS}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"Expected event fields of one length, got {lengths}")
+        if len(self.t):
+            self._check_values()
+
+    def _check_values(self) -> None:
+        step = np.flatnonzero(self.t[1:] < self.t[:-1])
+        if len(step):
+            at = int(step[0]) + 1
+            raise ValueError(
+                f"Expected events sorted by time, got {self.t[at]} us after {self.t[at - 1]} us "
+                f"at index {at}; sort the stream by t first"
+            )
+        x, y, p = int(self.x.max()), int(self.y.max()), int(self.p.max())
+        if x >= self.width or y >= self.height:
+            raise ValueError(
+                f"Expected events inside the {self.width}x{self.height} sensor, got x up to {x} "
+                f"and y up to {y}; give the true sensor size"
+            )
+        if p > 1:
+            raise ValueError(f"Expected polarities 0 and 1, got {p}")
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: Iterable[int],
+        x: Iterable[int],
+        y: Iterable[int],
+        p: Iterable[int],
+        *,
+        height: int,
+        width: int,
+    ) -> Events:
+        """Convert array-likes whose values fit the fields' types.
+
+        Raises:
+            ValueError: a value is not a whole number or does not fit its field.
+        """
+        fields = {}
+        for name, values in {"t": t, "x": x, "y": y, "p": p}.items():
+            raw = np.asarray(values)
+            with np.errstate(invalid="ignore"):
+                array = raw.astype(FIELDS[name])
+            if len(raw) and not np.array_equal(array.astype(raw.dtype), raw):
+                raise ValueError(
+                    f"Expected events.{name} to hold whole numbers that fit "
+                    f"{np.dtype(FIELDS[name])}, got values from {raw.min()} to {raw.max()}"
+                )
+            fields[name] = np.ascontiguousarray(array)
+        return cls(**fields, height=height, width=width)
+
+    @classmethod
+    def empty(cls, height: int, width: int) -> Events:
+        """A stream without events from a sensor of this size."""
+        return cls.from_arrays([], [], [], [], height=height, width=width)
+
+    @classmethod
+    def concatenate(cls, streams: Iterable[Events]) -> Events:
+        """Join streams of one sensor that follow each other in time.
+
+        Raises:
+            ValueError: there is no stream, the sensors differ, or a stream starts before the
+                previous one ends.
+        """
+        parts = list(streams)
+        if not parts:
+            raise ValueError("Expected at least one stream to concatenate, got none")
+        sizes = {(part.height, part.width) for part in parts}
+        if len(sizes) > 1:
+            raise ValueError(f"Expected streams of one sensor size, got {sorted(sizes)}")
+        joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS}
+        return cls(**joined, height=parts[0].height, width=parts[0].width)
+
+    @classmethod
+    def load(cls, path: Path | str, height: int | None = None, width: int | None = None) -> Events:
+        """Read a whole DSEC HDF5 file; the sensor size is needed where the file lacks it."""
+        from eqs.events.store import EventReader
+
+        with EventReader(path, height=height, width=width) as reader:
+            return reader.read()
+
+    def save(self, path: Path | str) -> None:
+        """Write a DSEC HDF5 file; it appears under its name only when it is complete."""
+        from eqs.events.store import EventWriter
+
+        with EventWriter(path, height=self.height, width=self.width) as writer:
+            writer.append(self)
+
+    def __len__(self) -> int:
+        """Number of events."""
+        return len(self.t)
+
+    def window(self, start_us: int, stop_us: int) -> Events:
+        """The events with `start_us <= t < stop_us`, as views."""
+        first, last = np.searchsorted(self.t, [start_us, stop_us], side="left")
+        return self[int(first) : int(last)]
+
+    def __getitem__(self, index: slice) -> Events:
+        """The events at a slice of indices, as views."""
+        part = object.__new__(Events)  # a slice of checked events needs no second check
+        for name in FIELDS:
+            object.__setattr__(part, name, getattr(self, name)[index])
+        object.__setattr__(part, "height", self.height)
+        object.__setattr__(part, "width", self.width)
+        return part
+
+    def shifted(self, offset_us: int) -> Events:
+        """The same stream on a clock that reads `offset_us` more."""
+        return Events(self.t + np.int64(offset_us), self.x, self.y, self.p, self.height, self.width)
