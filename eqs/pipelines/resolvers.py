@@ -1,0 +1,22 @@
+"""Values that configuration files derive rather than state."""
+
+from __future__ import annotations
+
+import torch
+from omegaconf import OmegaConf
+
+
+def precision(device: str) -> str:
+    """Fastest safe number type of a device: "cpu", "gpu", or "auto" for what is there.
+
+    bfloat16 autocast pays on processors that multiply in it and costs time on the others.
+    """
+    if device == "gpu" or (device == "auto" and torch.cuda.is_available()):
+        return "bf16-mixed" if torch.cuda.is_available() and torch.cuda.is_bf16_supported() else "16-mixed"
+    return "bf16-mixed" if torch.cpu.get_capabilities().get("avx512_bf16") else "32-true"
+
+
+def register_resolvers() -> None:
+    """Make the resolvers known to OmegaConf; may be called again."""
+    OmegaConf.register_new_resolver("precision", precision, replace=True)
+    OmegaConf.register_new_resolver("multiply", lambda a, b: a * b, replace=True)

@@ -1,0 +1,133 @@
+"""Train one detector: data, events, fit, test on the own and the real stream."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+import lightning
+from hydra.utils import instantiate
+from lightning.pytorch.callbacks import Callback, ModelCheckpoint
+from omegaconf import DictConfig
+from rich.console import Console
+
+from eqs.data import EventSource, RecordedEvents
+from eqs.pipelines.build import dataset, event_source
+from eqs.pipelines.command import explained
+from eqs.pipelines.runs import Run, recipe_hash
+from eqs.pipelines.timing import PhaseTimes
+from eqs.tasks import DetectionTask
+
+log = logging.getLogger(__name__)
+
+
+@explained
+def train(cfg: DictConfig) -> dict[str, Any]:
+    """Train and test as configured; a finished run is reported, not repeated."""
+    source = event_source(cfg.sim, cfg)
+    runs = Path(cfg.paths.runs) / cfg.data.name
+    run = Run(runs / source.label / f"{recipe_hash(cfg)}-seed{cfg.seed}")
+    if run.finished and not cfg.overwrite:
+        log.info("%s is finished already; overwrite=true trains it again", run.folder)
+    else:
+        if cfg.overwrite:
+            shutil.rmtree(run.folder, ignore_errors=True)
+        execute(cfg, run, source, PhaseTimes(runs / "timings.json"))
+    result = run.result()
+    show(result)
+    return result
+
+
+def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -> None:
+    """Do the work of one run and record what it measured."""
+    lightning.seed_everything(cfg.seed, workers=True, verbose=False)
+    with times.measure("generate data"):
+        data = dataset(cfg)
+    with times.measure(f"simulate {source.label}"):
+        for split in ("train", "val", "test"):
+            source.prepare(data.recordings(split))
+    run.save_config(cfg)
+    tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
+    if isinstance(source, RecordedEvents):
+        del tests["own"]  # on the recorded events both tests are the same one
+    protocol = instantiate(cfg.protocol)
+    datamodule = instantiate(cfg.datamodule)(
+        dataset=data, protocol=protocol, source=source, tests=tests
+    )
+    task = build_task(cfg, protocol, list(tests))
+    trainer = build_trainer(cfg, run)
+    checkpoint = checkpoint_path(cfg, run)
+    with times.measure(f"train {source.label}", resumed=checkpoint is not None):
+        start = time.perf_counter()
+        trainer.fit(task, datamodule, ckpt_path=checkpoint)
+        trainer.save_checkpoint(run.weights, weights_only=True)
+        metrics = trainer.test(task, datamodule, verbose=False)
+    values = {name: value for stream in metrics for name, value in stream.items()}
+    run.finish(describe(cfg, source, protocol.card(), values, time.perf_counter() - start))
+
+
+def build_task(cfg: DictConfig, protocol: Any, test_streams: list[str]) -> DetectionTask:
+    """The configured detector in its training module."""
+    model = instantiate(cfg.model, num_classes=len(protocol.class_names))
+    return instantiate(cfg.task)(
+        model=model, class_names=protocol.class_names, test_streams=test_streams
+    )
+
+
+def build_trainer(cfg: DictConfig, run: Run) -> lightning.Trainer:
+    """The configured trainer, writing into the run's folder."""
+    last = ModelCheckpoint(run.checkpoints, filename="last", enable_version_counter=False)
+    callbacks: list[Callback] = [last, *instantiate(cfg.callbacks).values()]
+    loggers = [logger(save_dir=run.folder) for logger in instantiate(cfg.logger).values()]
+    return instantiate(cfg.trainer, callbacks=callbacks, logger=loggers)
+
+
+def checkpoint_path(cfg: DictConfig, run: Run) -> Path | None:
+    """Where to resume: the run's newest checkpoint, a given file, or nowhere.
+
+    Raises:
+        FileNotFoundError: the given file does not exist.
+    """
+    if cfg.ckpt_path is None:
+        return None
+    if cfg.ckpt_path == "last":
+        return run.last_checkpoint if run.last_checkpoint.exists() else None
+    path = Path(cfg.ckpt_path)
+    if not path.is_file():
+        raise FileNotFoundError(f"Expected a checkpoint at {path}, found none; set ckpt_path")
+    return path
+
+
+def describe(
+    cfg: DictConfig,
+    source: EventSource,
+    card: dict[str, Any],
+    values: dict[str, float],
+    seconds: float,
+) -> dict[str, Any]:
+    """The record of a finished run; where the stream is the real one, it is its own test."""
+    real = {name.removeprefix("test/real/"): v for name, v in values.items() if "/real/" in name}
+    own = {name.removeprefix("test/own/"): v for name, v in values.items() if "/own/" in name}
+    return {
+        "simulator": source.label.split("-")[0],
+        "system": source.label,
+        "seed": cfg.seed,
+        "recipe": recipe_hash(cfg),
+        "own": own or real,
+        "real": real,
+        "protocol": card,
+        "seconds": round(seconds, 1),
+    }
+
+
+def show(result: dict[str, Any]) -> None:
+    """Print both mAPs of a run."""
+    own, real = result["own"], result["real"]
+    Console().print(
+        f"[bold]{result['system']}[/bold] seed {result['seed']}: "
+        f"own test mAP {100 * own['map']:.1f} (AP50 {100 * own['map_50']:.1f}), "
+        f"real test mAP {100 * real['map']:.1f} (AP50 {100 * real['map_50']:.1f})"
+    )

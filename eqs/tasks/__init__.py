@@ -1,0 +1,5 @@
+"""What one step of training or evaluation does."""
+
+from eqs.tasks.detection import DetectionTask
+
+__all__ = ["DetectionTask"]

@@ -1,0 +1,149 @@
+"""Recurrent detector training: chunks of windows, carried states, mAP on every test stream."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import lightning
+import torch
+from torch import Tensor, nn
+from torch.optim import Optimizer
+from torch.optim.lr_scheduler import LRScheduler
+
+from eqs.metrics import MeanAveragePrecision
+from eqs.models import RVTDetector, States, detach_states, postprocess, reset_states
+
+Batch = dict[str, Tensor]
+
+
+class DetectionTask(lightning.LightningModule):
+    """Train and evaluate an RVT detector on batches of consecutive windows.
+
+    Convention: states flow from a batch to the next one of the same slot and are cut from the
+    gradient in between; rows marked `first` start from zero.
+
+    Args:
+        model: the detector.
+        optimizer: builds the optimizer from the parameters.
+        scheduler: builds the schedule, stepped once per batch, from the optimizer.
+        class_names: names of the classes, in label order.
+        test_streams: name of each test dataloader's event stream.
+        confidence_threshold: objectness times class probability below which a box is dropped.
+        nms_threshold: overlap above which the weaker of two boxes of a class is dropped.
+        drop_empty_frames: leave frames without ground truth out of the mAP.
+    """
+
+    def __init__(
+        self,
+        model: RVTDetector,
+        optimizer: Callable[[Iterable[nn.Parameter]], Optimizer],
+        scheduler: Callable[[Optimizer], LRScheduler],
+        class_names: Sequence[str],
+        test_streams: Sequence[str] = (),
+        confidence_threshold: float = 0.001,
+        nms_threshold: float = 0.45,
+        *,
+        drop_empty_frames: bool = False,
+    ) -> None:
+        super().__init__()
+        self.model = model
+        self.make_optimizer = optimizer
+        self.make_scheduler = scheduler
+        self.thresholds = (confidence_threshold, nms_threshold)
+        self.test_streams = list(test_streams)
+
+        def precision_metric() -> MeanAveragePrecision:
+            return MeanAveragePrecision(
+                class_names=class_names, drop_empty_frames=drop_empty_frames
+            )
+
+        self.val_precision = precision_metric()
+        self.test_precision = nn.ModuleList(precision_metric() for _ in self.test_streams)
+        self._train_states: States | None = None
+        self._evaluation_states: States | None = None
+
+    def training_step(self, batch: Batch, batch_idx: int) -> Tensor:
+        """Loss over all labelled frames of the chunk, in one call of neck and head."""
+        states = reset_states(self._train_states, batch["first"])
+        maps, states = self.model.backbone.forward_sequence(batch["histograms"].float(), states)
+        self._train_states = detach_states(states)
+        labelled = batch["labelled"]
+        losses = self.model.loss([stage[labelled] for stage in maps], batch["labels"][labelled])
+        self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
+        self.log("loss", losses["loss"].detach(), prog_bar=True, logger=False)
+        return losses["loss"]
+
+    def validation_step(self, batch: Batch, batch_idx: int) -> None:
+        """Collect detections on the stream the detector was trained on."""
+        self._evaluate(batch, self.val_precision)
+
+    def on_validation_epoch_end(self) -> None:
+        """Log the mAP of the whole validation set."""
+        self._log_precision("val", self.val_precision)
+
+    def test_step(self, batch: Batch, batch_idx: int, dataloader_idx: int = 0) -> None:
+        """Collect detections on one of the test streams."""
+        self._evaluate(batch, self.test_precision[dataloader_idx])
+
+    def on_test_epoch_end(self) -> None:
+        """Log the mAP of each test stream."""
+        for stream, metric in zip(self.test_streams, self.test_precision, strict=True):
+            self._log_precision(f"test/{stream}", metric)
+
+    def detect(self, batch: Batch) -> list[dict[str, Tensor]]:
+        """Detections of each labelled frame of a chunk, with states carried from the last call.
+
+        Returns:
+            One dict per labelled frame with boxes (n, 4) as x1 y1 x2 y2 pixels, scores, labels.
+        """
+        states = reset_states(self._evaluation_states, batch["first"])
+        maps, self._evaluation_states = self.model.backbone.forward_sequence(
+            batch["histograms"].float(), states
+        )
+        labelled = batch["labelled"]
+        if not labelled.any():
+            return []
+        predictions = self.model.detect([stage[labelled] for stage in maps])
+        confidence, overlap = self.thresholds
+        return postprocess(predictions.float(), confidence, overlap)
+
+    def _evaluate(self, batch: Batch, metric: nn.Module) -> None:
+        detections = self.detect(batch)
+        targets = [ground_truth(rows) for rows in batch["labels"][batch["labelled"]]]
+        if detections:
+            metric.update(detections, targets)
+
+    def _log_precision(self, prefix: str, metric: nn.Module) -> None:
+        values = metric.compute()
+        metric.reset()
+        self._evaluation_states = None
+        scalars = {key: value for key, value in values.items() if value.ndim == 0}
+        self.log_dict({f"{prefix}/{key}": value.float() for key, value in scalars.items()})
+
+    def configure_optimizers(self) -> dict[str, Any]:
+        """Optimizer with a schedule that moves once per batch."""
+        optimizer = self.make_optimizer(self.model.parameters())
+        scheduler = {"scheduler": self.make_scheduler(optimizer), "interval": "step"}
+        return {"optimizer": optimizer, "lr_scheduler": scheduler}
+
+    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        """Keep the recurrent states, so that a resumed run goes on where it stopped."""
+        checkpoint["train_states"] = self._train_states
+
+    def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        """Take the recurrent states back."""
+        states = checkpoint.get("train_states")
+        self._train_states = move_states(states, self.device) if states is not None else None
+
+
+def ground_truth(rows: Tensor) -> dict[str, Tensor]:
+    """Boxes of one frame from label rows (class, cx, cy, w, h) with zero rows as padding."""
+    rows = rows[rows[:, 3] > 0].float()
+    centre, half = rows[:, 1:3], rows[:, 3:5] / 2
+    return {"boxes": torch.cat([centre - half, centre + half], dim=1), "labels": rows[:, 0].long()}
+
+
+def move_states(states: States, device: torch.device) -> States:
+    """Recurrent states on another device."""
+    return [(hidden.to(device), cell.to(device)) for hidden, cell in states]
