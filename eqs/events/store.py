@@ -1,0 +1,386 @@
+"""Event files in the layout of DSEC: HDF5 with a coarse millisecond index.
+
+A file holds `events/{x,y,p,t}`, the time of each event counted from the scalar `t_offset`, and
+`ms_to_idx`, whose entry k is the index of the first event at or after k milliseconds. Files written
+here also carry the sensor size as attributes `height` and `width`, which DSEC's own files lack.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import h5py
+import hdf5plugin
+import numpy as np
+from numpy.typing import NDArray
+
+from eqs.events.stream import FIELDS, Events
+
+# Windows of some ten thousand events read fastest from chunks of this length: larger chunks are
+# decompressed in vain, smaller ones cost a call each.
+CHUNK_EVENTS = 32768
+STORED_TYPES = {"t": np.uint32, "x": np.uint16, "y": np.uint16, "p": np.uint8}
+LONGEST_US = int(np.iinfo(np.uint32).max)
+
+
+class EventReader:
+    """Reads windows of one event file without loading the rest of it.
+
+    The file is opened at the first use and its dataset handles are kept, since HDF5's chunk cache
+    lives as long as they do. A pickled copy, or a copy in a forked process, opens the file anew.
+
+    Args:
+        path: file in the layout of DSEC.
+        height: rows of the sensor; needed where the file does not carry them.
+        width: columns of the sensor; needed where the file does not carry them.
+
+    Raises:
+        FileNotFoundError: there is no such file (at the first use).
+        ValueError: the file is truncated, lacks a dataset, holds something other than sorted events
+            of this sensor, or states another sensor size (at the first use or the first window
+            that meets the fault).
+    """
+
+    def __init__(
+        self, path: Path | str, height: int | None = None, width: int | None = None
+    ) -> None:
+        """Remember the file; nothing is opened yet."""
+        self.path = Path(path)
+        self._size = (height, width)
+        self._handles: _Handles | None = None
+
+    def __enter__(self) -> Self:
+        """Open the file."""
+        self._opened()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; the next use opens it again."""
+        if self._handles is not None and self._handles.process == os.getpid():
+            self._handles.file.close()
+        self._handles = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the handles behind: they mean nothing in another process."""
+        return {**self.__dict__, "_handles": None}
+
+    @property
+    def height(self) -> int:
+        """Rows of the sensor."""
+        return self._opened().height
+
+    @property
+    def width(self) -> int:
+        """Columns of the sensor."""
+        return self._opened().width
+
+    @property
+    def start_us(self) -> int:
+        """Time of the first event; the file's offset if there is none."""
+        return self._opened().start_us
+
+    @property
+    def stop_us(self) -> int:
+        """One microsecond past the last event; the file's offset if there is none."""
+        return self._opened().stop_us
+
+    def __len__(self) -> int:
+        """Number of events."""
+        return self._opened().count
+
+    def read(self) -> Events:
+        """All events at once."""
+        return self.window(self.start_us, self.stop_us)
+
+    def window(self, start_us: int, stop_us: int) -> Events:
+        """The events with `start_us <= t < stop_us`; none where the recording has none.
+
+        Raises:
+            ValueError: an event met on the way is out of order or outside the sensor.
+        """
+        file = self._opened()
+        start_us, stop_us = max(start_us, file.start_us), min(stop_us, file.stop_us)
+        if start_us >= stop_us:
+            return Events.empty(file.height, file.width)
+        try:
+            first, t = file.times(start_us - file.offset_us, stop_us - file.offset_us)
+            rows = slice(first, first + len(t))
+            fields = {name: file.columns[name][rows].astype(FIELDS[name]) for name in "xyp"}
+            return Events(t + file.offset_us, **fields, height=file.height, width=file.width)
+        except (OSError, ValueError) as error:
+            raise ValueError(f"{self.path}: {error}") from error
+
+    def _opened(self) -> _Handles:
+        if self._handles is None or self._handles.process != os.getpid():
+            self._handles = _Handles(self.path, *self._size)
+        return self._handles
+
+
+class _Handles:
+    """An open event file, checked as far as is possible without reading its events."""
+
+    def __init__(self, path: Path, height: int | None, width: int | None) -> None:
+        """Open and check the file."""
+        self.process = os.getpid()
+        self.file = _open_hdf5(path)
+        try:
+            self._check_layout(path)
+            self.columns = {name: self.file[f"events/{name}"] for name in FIELDS}
+            self._check_columns(path)
+            self.count = len(self.columns["t"])
+            self.offset_us = int(self.file["t_offset"][()]) if "t_offset" in self.file else 0
+            self.index = self.file["ms_to_idx"][:].astype(np.int64)
+            self._check_index(path)
+            self.height = self._side(path, "height", height)
+            self.width = self._side(path, "width", width)
+            self.start_us = self.stop_us = self.offset_us
+            if self.count:
+                self.start_us += int(self.columns["t"][0])
+                self.stop_us += int(self.columns["t"][-1]) + 1
+            self._check_times(path)
+        except BaseException as error:
+            self.file.close()
+            if isinstance(error, OSError):  # a chunk that cannot be read
+                raise ValueError(f"{path}: {error}; replace the damaged file") from error
+            raise
+
+    def times(self, start: int, stop: int) -> tuple[int, NDArray[np.int64]]:
+        """Index of the first event in [start, stop) and the times of all of them.
+
+        The index brackets the window to whole milliseconds, a search inside the bracket makes it
+        exact. One event more is read on either side, which shows an index that brackets too
+        little. Times count from the offset.
+        """
+        first_ms, stop_ms = start // 1000, -(-stop // 1000)
+        low = max(int(self.index[min(first_ms, len(self.index) - 1)]) - 1, 0)
+        high = self.count if stop_ms >= len(self.index) else int(self.index[stop_ms]) + 1
+        high = min(high, self.count)
+        t = self.columns["t"][low:high].astype(np.int64)
+        if np.any(t[1:] < t[:-1]):
+            raise ValueError(
+                f"expected events sorted by time, got time running backwards between event {low} "
+                f"and event {high}; sort the stream and write the file again"
+            )
+        first, last = np.searchsorted(t, [start, stop], side="left")
+        if (first == 0 and low > 0) or (last == len(t) and high < self.count):
+            raise ValueError(
+                f"expected ms_to_idx to agree with events/t, got events outside their millisecond "
+                f"near event {low} or event {high}; write the file again"
+            )
+        return int(low + first), t[first:last]
+
+    def _check_layout(self, path: Path) -> None:
+        needed = [f"events/{name}" for name in "xypt"] + ["ms_to_idx"]
+        missing = [name for name in needed if not isinstance(self.file.get(name), h5py.Dataset)]
+        if missing:
+            raise ValueError(
+                f"Expected {path} to have the layout of DSEC, got a file without "
+                f"{', '.join(missing)}; convert it to events/{{x,y,p,t}}, ms_to_idx and t_offset"
+            )
+
+    def _check_columns(self, path: Path) -> None:
+        for name, column in self.columns.items():
+            if column.ndim != 1 or column.dtype.kind not in "uib":
+                raise ValueError(
+                    f"Expected events/{name} in {path} to be a row of whole numbers, got "
+                    f"{column.dtype} of shape {column.shape}; convert it to "
+                    f"{np.dtype(STORED_TYPES[name])}"
+                )
+        lengths = {name: len(column) for name, column in self.columns.items()}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(
+                f"Expected event fields of one length in {path}, got {lengths}; "
+                "write the file again"
+            )
+
+    def _check_index(self, path: Path) -> None:
+        index = self.index
+        sound = len(index) and index[0] == 0 and index[-1] <= self.count
+        if self.count and not (sound and np.all(index[1:] >= index[:-1])):
+            raise ValueError(
+                f"Expected ms_to_idx in {path} to rise from 0 to at most {self.count}, got another "
+                "row of numbers; sort the stream and write the file again"
+            )
+
+    def _check_times(self, path: Path) -> None:
+        if self.count and (self.start_us < 0 or int(self.columns["t"][0]) < 0):
+            raise ValueError(
+                f"Expected times of zero or more in {path}, got {self.start_us} us for the first "
+                "event; shift the stream and write the file again"
+            )
+        if self.stop_us < self.start_us:
+            raise ValueError(
+                f"Expected events sorted by time in {path}, got the last event at "
+                f"{self.stop_us - 1} us, before the first at {self.start_us} us; "
+                "sort the stream and write the file again"
+            )
+
+    def _side(self, path: Path, name: str, given: int | None) -> int:
+        stored = self.file.attrs.get(name)
+        if stored is None and given is None:
+            raise ValueError(
+                f"Expected the sensor's {name} for {path}, which does not carry it; pass {name}= "
+                "or set data.size"
+            )
+        if stored is not None and given is not None and int(stored) != given:
+            raise ValueError(
+                f"Expected a sensor with {name} {given}, got {int(stored)} in {path}; "
+                "set data.size to the size of the recording"
+            )
+        return int(stored) if given is None else given
+
+
+class EventWriter:
+    """Writes one event file, piece by piece; it gets its name only when it is complete.
+
+    Until then it is called `<name>.partial`, which an exception inside the `with` block removes.
+    The same events give the same file however they are cut into pieces.
+
+    Args:
+        path: where the file will be; its folder is made if need be.
+        height: rows of the sensor.
+        width: columns of the sensor.
+        t_offset_us: time from which the stored times count; by default that of the first event.
+
+    Example:
+        >>> import tempfile
+        >>> folder = tempfile.TemporaryDirectory()
+        >>> path = Path(folder.name) / "events.h5"
+        >>> events = Events.from_arrays(t=[7, 9], x=[1, 2], y=[0, 0], p=[1, 0], height=4, width=4)
+        >>> with EventWriter(path, height=4, width=4) as writer:
+        ...     writer.append(events)
+        >>> with EventReader(path) as reader:
+        ...     reader.start_us, reader.stop_us, len(reader.window(8, 10))
+        (7, 10, 1)
+        >>> folder.cleanup()
+    """
+
+    def __init__(
+        self, path: Path | str, height: int, width: int, t_offset_us: int | None = None
+    ) -> None:
+        """Remember the file's name; nothing is created yet."""
+        self.path = Path(path)
+        self.partial_path = self.path.with_name(self.path.name + ".partial")
+        self.height, self.width = height, width
+        self._offset_us = t_offset_us
+        self._index = [np.zeros(1, np.int64)]  # entries of ms_to_idx; the first is 0 by definition
+        self._last_us = -1
+        self._count = self._next_ms = 0
+        self._pending: list[Events] = []
+        self._pending_count = 0
+
+    def __enter__(self) -> Self:
+        """Begin the file under its temporary name."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = h5py.File(self.partial_path, "w")
+        self._file.attrs.update(height=self.height, width=self.width)
+        for name, dtype in STORED_TYPES.items():
+            self._file.create_dataset(
+                f"events/{name}",
+                shape=(0,),
+                maxshape=(None,),
+                chunks=(CHUNK_EVENTS,),
+                dtype=dtype,
+                **hdf5plugin.Blosc(cname="zstd", clevel=1, shuffle=hdf5plugin.Blosc.SHUFFLE),
+            )
+        self._next_ms = 1
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Complete the file and give it its name, or remove it after an exception."""
+        try:
+            if kind is None:
+                self._flush()
+                index = np.concatenate(self._index).astype(np.uint64)
+                self._file.create_dataset("ms_to_idx", data=index)
+                self._file.create_dataset("t_offset", data=np.int64(self._offset_us or 0))
+                self._file.close()
+                self.partial_path.replace(self.path)
+        finally:
+            self._file.close()
+            self.partial_path.unlink(missing_ok=True)
+
+    def append(self, events: Events) -> None:
+        """Add events that follow those already given.
+
+        Raises:
+            ValueError: the sensor differs, time runs backwards or is negative, or the recording
+                grows longer than the layout's 32-bit times can count (71 minutes).
+        """
+        self._check(events)
+        if len(events) == 0:
+            return
+        if self._offset_us is None:
+            self._offset_us = int(events.t[0])
+        self._last_us = int(events.t[-1])
+        self._pending.append(events)
+        self._pending_count += len(events)
+        if self._pending_count >= CHUNK_EVENTS:
+            self._flush()
+
+    def _check(self, events: Events) -> None:
+        if (events.height, events.width) != (self.height, self.width):
+            raise ValueError(
+                f"Expected events of a {self.width}x{self.height} sensor for {self.path}, got "
+                f"{events.width}x{events.height}; give the writer the stream's size"
+            )
+        if len(events) == 0:
+            return
+        first, last = int(events.t[0]), int(events.t[-1])
+        earliest = max(self._last_us, self._offset_us or 0, 0)
+        if first < earliest:
+            raise ValueError(
+                f"Expected events at or after {earliest} us for {self.path}, got {first} us; "
+                "append streams in time order, from zero or the given offset on"
+            )
+        offset = first if self._offset_us is None else self._offset_us
+        if last - offset > LONGEST_US:
+            raise ValueError(
+                f"Expected a recording of at most {LONGEST_US} us for {self.path}, got "
+                f"{last - offset} us; split it"
+            )
+
+    def _flush(self) -> None:
+        if not self._pending:
+            return
+        part = Events.concatenate(self._pending)
+        relative = part.t - np.int64(self._offset_us or 0)
+        self._extend_index(relative)
+        stop = self._count + len(part)
+        for name in STORED_TYPES:
+            values = relative.astype(np.uint32) if name == "t" else getattr(part, name)
+            self._file[f"events/{name}"].resize((stop,))
+            self._file[f"events/{name}"][self._count : stop] = values
+        self._count, self._pending, self._pending_count = stop, [], 0
+
+    def _extend_index(self, relative_us: NDArray[np.int64]) -> None:
+        stop_ms = int(relative_us[-1]) // 1000 + 1
+        edges_us = np.arange(self._next_ms, stop_ms, dtype=np.int64) * 1000
+        self._index.append(self._count + np.searchsorted(relative_us, edges_us, side="left"))
+        self._next_ms = max(self._next_ms, stop_ms)
+
+
+def _open_hdf5(path: Path) -> h5py.File:
+    if not path.is_file():
+        raise FileNotFoundError(
+            f"Expected an event file at {path}, found none; check data.root, or make the file first"
+        )
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise ValueError(
+            f"Expected {path} to be a whole HDF5 file, got one that cannot be opened ({error}); "
+            "replace the truncated or foreign file"
+        ) from error

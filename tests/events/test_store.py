@@ -1,0 +1,254 @@
+"""Event files: what is written is read back, in any window, and every bad file is named."""
+
+import multiprocessing
+import pickle
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eqs.events import EventReader, Events, EventWriter
+
+
+def same(a, b):
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in "txyp")
+
+
+@pytest.fixture
+def stored(tmp_path, make_events):
+    """A stream of a recording whose clock starts late, and its file."""
+    events = make_events(5000, start_us=10_000_000_123, stop_us=10_000_300_456)
+    events.save(tmp_path / "events.h5")
+    return events, tmp_path / "events.h5"
+
+
+def plain_file(path, t=(0, 1500), x=(1, 2), y=(1, 2), p=(0, 1), ms_to_idx=(0, 1), t_offset=0, **of):
+    """An uncompressed file with the given contents, of the types the values have."""
+    with h5py.File(path, "w") as file:
+        for name, values in {"t": t, "x": x, "y": y, "p": p}.items():
+            if values is not None:
+                file[f"events/{name}"] = np.asarray(values)
+        if ms_to_idx is not None:
+            file["ms_to_idx"] = np.asarray(ms_to_idx, np.uint64)
+        file["t_offset"] = np.int64(t_offset)
+        file.attrs.update(**{"height": 24, "width": 32, **of})
+    return path
+
+
+def test_round_trip_keeps_everything(stored):
+    events, path = stored
+    loaded = Events.load(path)
+    assert same(events, loaded)
+    assert (loaded.height, loaded.width) == (24, 32)
+
+
+def test_layout_is_that_of_dsec(stored):
+    events, path = stored
+    with h5py.File(path) as file:
+        types = {name: file[f"events/{name}"].dtype for name in "txyp"}
+        index, t = file["ms_to_idx"][:], file["events/t"][:].astype(np.int64)
+        assert types == {"t": np.uint32, "x": np.uint16, "y": np.uint16, "p": np.uint8}
+        assert index.dtype == np.uint64
+        assert file["t_offset"][()] == events.t[0]
+        assert file["events/t"].id.get_create_plist().get_filter(0)[0] == 32001
+    expected = np.searchsorted(t, 1000 * np.arange(t[-1] // 1000 + 1))
+    np.testing.assert_array_equal(index, expected)
+
+
+@settings(max_examples=60, deadline=None)
+@given(start=st.integers(-5_000, 305_000), length=st.integers(0, 200_000))
+def test_any_window_equals_the_slice_in_memory(window_case, start, length):
+    events, reader = window_case
+    start += 10_000_000_000
+    assert same(reader.window(start, start + length), events.window(start, start + length))
+
+
+@pytest.fixture(scope="module")
+def window_case(tmp_path_factory):
+    generator = np.random.default_rng(3)
+    t = 10_000_000_123 + np.sort(generator.integers(0, 300_000, 4000))
+    t[1000:1200] = t[1000]  # many events in one microsecond
+    t[2000:2500] += np.int64(2000) * (np.arange(500) > 250)  # and milliseconds without any
+    t = np.sort(t)
+    x, y, p = (generator.integers(0, top, 4000) for top in (32, 24, 2))
+    events = Events.from_arrays(t, x, y, p, height=24, width=32)
+    path = tmp_path_factory.mktemp("window") / "events.h5"
+    events.save(path)
+    with EventReader(path) as reader:
+        yield events, reader
+
+
+def test_windows_outside_the_recording_are_empty(stored):
+    events, path = stored
+    with EventReader(path) as reader:
+        assert len(reader.window(0, reader.start_us)) == 0
+        assert len(reader.window(reader.stop_us, reader.stop_us + 50_000)) == 0
+        assert len(reader.window(reader.start_us + 5, reader.start_us)) == 0
+        assert same(reader.window(0, 2**60), events)
+        assert reader.stop_us == events.t[-1] + 1
+        assert len(reader) == len(events)
+
+
+def test_pieces_give_the_same_file_as_the_whole(tmp_path, make_events):
+    events = make_events(90_000, stop_us=700_000)
+    events.save(tmp_path / "whole.h5")
+    with EventWriter(tmp_path / "pieces.h5", 24, 32) as writer:
+        for cut in (slice(0, 1), slice(1, 1), slice(1, 40_000), slice(40_000, None)):
+            writer.append(events[cut])
+    with h5py.File(tmp_path / "whole.h5") as a, h5py.File(tmp_path / "pieces.h5") as b:
+        for name in ("events/t", "events/x", "events/y", "events/p", "ms_to_idx", "t_offset"):
+            assert np.array_equal(a[name][()], b[name][()]), name
+    assert same(Events.load(tmp_path / "pieces.h5"), events)
+
+
+def test_empty_stream_round_trip(tmp_path):
+    Events.empty(4, 5).save(tmp_path / "none.h5")
+    loaded = Events.load(tmp_path / "none.h5")
+    assert (len(loaded), loaded.height, loaded.width) == (0, 4, 5)
+
+
+def test_given_offset_is_stored(tmp_path, make_events):
+    events = make_events(100, start_us=2_000, stop_us=9_000)
+    with EventWriter(tmp_path / "e.h5", 24, 32, t_offset_us=1_000) as writer:
+        writer.append(events)
+    with h5py.File(tmp_path / "e.h5") as file:
+        assert file["t_offset"][()] == 1_000
+    assert same(Events.load(tmp_path / "e.h5"), events)
+
+
+def test_file_appears_only_when_complete(tmp_path, make_events):
+    path = tmp_path / "deep" / "events.h5"
+    with EventWriter(path, 24, 32) as writer:
+        writer.append(make_events(100))
+        assert not path.exists()
+    assert path.exists()
+    assert [file.name for file in path.parent.iterdir()] == ["events.h5"]
+
+
+def test_exception_leaves_the_old_file_and_no_partial_one(tmp_path, make_events):
+    path = tmp_path / "events.h5"
+    old = make_events(10)
+    old.save(path)
+
+    def interrupted():
+        with EventWriter(path, 24, 32) as writer:
+            writer.append(make_events(50_000, seed=1))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert [file.name for file in tmp_path.iterdir()] == ["events.h5"]
+    assert same(Events.load(path), old)
+
+
+def _count_window(reader):
+    return len(reader.window(reader.start_us, reader.start_us + 100_000))
+
+
+def test_reader_travels_to_other_processes(stored):
+    events, path = stored
+    with EventReader(path) as reader:
+        expected = _count_window(reader)
+        assert _count_window(pickle.loads(pickle.dumps(reader))) == expected
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            assert pool.apply(_count_window, (reader,)) == expected
+    assert expected == len(events.window(events.t[0], events.t[0] + 100_000))
+
+
+def test_reader_reopens_after_close(stored):
+    events, path = stored
+    reader = EventReader(path)
+    assert len(reader.read()) == len(events)
+    reader.close()
+    assert len(reader.read()) == len(events)
+    reader.close()
+
+
+def test_size_comes_from_the_file_or_the_arguments(tmp_path):
+    path = plain_file(tmp_path / "e.h5")
+    with h5py.File(path, "a") as file:
+        del file.attrs["height"], file.attrs["width"]
+    assert Events.load(path, height=24, width=40).width == 40
+    with pytest.raises(ValueError, match=r"sensor's height .*e\.h5.*data\.size"):
+        Events.load(path)
+
+
+def test_other_size_than_stated_is_refused(stored):
+    with pytest.raises(ValueError, match=r"width 640, got 32 .*set data\.size"):
+        Events.load(stored[1], height=24, width=640)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"nowhere\.h5, found none.*data\.root"):
+        Events.load(tmp_path / "nowhere.h5")
+
+
+def test_truncated_file(stored):
+    path = stored[1]
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(ValueError, match=r"events\.h5 to be a whole HDF5 file"):
+        Events.load(path)
+
+
+def test_foreign_file(tmp_path):
+    (tmp_path / "text.h5").write_text("t x y p\n")
+    with pytest.raises(ValueError, match="whole HDF5 file"):
+        Events.load(tmp_path / "text.h5")
+    path = plain_file(tmp_path / "e.h5", p=None, ms_to_idx=None)
+    with pytest.raises(ValueError, match="without events/p, ms_to_idx; convert"):
+        Events.load(path)
+
+
+@pytest.mark.parametrize(
+    ("contents", "message"),
+    [
+        ({"t": (1500, 0)}, "sorted by time"),
+        ({"t": (0, 1500, 1400, 1600), "x": [1] * 4, "y": [1] * 4, "p": [1] * 4}, "sorted by time"),
+        ({"t": (-5, 1500)}, "zero or more.* got -5 us"),
+        ({"t_offset": -7000}, "zero or more.* got -7000 us"),
+        ({"x": (1, 32)}, "inside the 32x24 sensor, got x up to 32"),
+        ({"y": (24, 1)}, "inside the 32x24 sensor"),
+        ({"p": (0, 3)}, "polarities 0 and 1, got 3"),
+        ({"t": (0.0, 0.1)}, "events/t .* whole numbers, got float64"),
+        ({"x": (1,)}, "one length .*'x': 1"),
+        ({"ms_to_idx": (0, 5)}, "ms_to_idx .*rise from 0 to at most 2"),
+    ],
+)
+def test_bad_contents(tmp_path, contents, message):
+    path = plain_file(tmp_path / "bad.h5", **contents)
+    with pytest.raises(ValueError, match=message) as caught:
+        Events.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_index_that_hides_events_is_noticed(tmp_path):
+    path = plain_file(
+        tmp_path / "e.h5", t=(0, 1500, 2500), x=[1] * 3, y=[1] * 3, p=[1] * 3, ms_to_idx=(0, 1, 1)
+    )
+    with EventReader(path) as reader:
+        assert len(reader.read()) == 3
+        with pytest.raises(ValueError, match="ms_to_idx to agree with events/t"):
+            reader.window(1000, 2000)
+
+
+def test_writer_refuses_what_the_layout_cannot_hold(tmp_path, make_events):
+    events = make_events(100, start_us=5_000, stop_us=9_000)
+
+    def write(*streams, **options):
+        with EventWriter(tmp_path / "e.h5", 24, 32, **options) as writer:
+            for stream in streams:
+                writer.append(stream)
+
+    with pytest.raises(ValueError, match="append streams in time order"):
+        write(events, events)
+    with pytest.raises(ValueError, match="at or after 8000 us"):
+        write(events, t_offset_us=8_000)
+    with pytest.raises(ValueError, match="at or after 0 us"):
+        write(events.shifted(-6_000))
+    with pytest.raises(ValueError, match=r"of a 32x24 sensor .*got 9x9"):
+        write(Events.empty(9, 9))
+    with pytest.raises(ValueError, match="recording of at most 4294967295 us"):
+        write(Events.concatenate([events, events.shifted(2**32)]))
+    assert list(tmp_path.iterdir()) == []
