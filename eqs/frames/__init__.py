@@ -1,0 +1,15 @@
+"""Frames: what a clip is, how it is read, and how colour becomes grey."""
+
+from eqs.frames.checks import checked_frames, checked_times
+from eqs.frames.folder import FrameFolder, image_paths, read_image
+from eqs.frames.luma import GreyImage, luma
+
+__all__ = [
+    "FrameFolder",
+    "GreyImage",
+    "checked_frames",
+    "checked_times",
+    "image_paths",
+    "luma",
+    "read_image",
+]

@@ -1,0 +1,144 @@
+"""Event keys: one int64 per event, and putting them in order.
+
+Kernels write an event as a single number, time above pixel above polarity, so that sorting and
+merging move eight bytes per event. Convention: streams are ordered by (t, y, x, ordinal), where the
+ordinal is the order in which a pixel fired.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from eqs.events import Events
+
+PIXEL_BITS = 26  # 67 million pixels
+TIME_SHIFT = PIXEL_BITS + 1
+MAX_PIXELS = 1 << PIXEL_BITS
+MAX_TIME_US = 1 << (62 - TIME_SHIFT)  # nine hours
+_DIGIT_BITS = 8
+_PIXEL_MASK = (1 << PIXEL_BITS) - 1
+
+
+@njit(cache=True)
+def event_key(time_us: int, pixel: int, polarity: int) -> int:
+    """An event as one number; `pixel` counts row by row."""
+    return (time_us << TIME_SHIFT) | (pixel << 1) | polarity
+
+
+@njit(cache=True)
+def with_room(keys: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
+    """The same keys in a buffer that holds at least `needed`."""
+    if needed <= keys.size:
+        return keys
+    larger = np.empty(max(2 * keys.size, needed), np.int64)
+    larger[: keys.size] = keys
+    return larger
+
+
+@njit(cache=True, nogil=True)
+def _sort_by_time(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
+    """Stable radix sort on the time above `start_us`."""
+    latest = 0
+    for key in keys:
+        latest = max(latest, (key >> TIME_SHIFT) - start_us)
+    source, target = keys.copy(), np.empty_like(keys)
+    shift = 0
+    while latest >> shift:
+        counts = np.zeros((1 << _DIGIT_BITS) + 1, np.int64)
+        for key in source:
+            counts[((((key >> TIME_SHIFT) - start_us) >> shift) & 255) + 1] += 1
+        for digit in range(255):
+            counts[digit + 1] += counts[digit]
+        for key in source:
+            digit = (((key >> TIME_SHIFT) - start_us) >> shift) & 255
+            target[counts[digit]] = key
+            counts[digit] += 1
+        source, target = target, source
+        shift += _DIGIT_BITS
+    return source
+
+
+@njit(cache=True, nogil=True)
+def _in_raster_order(keys: NDArray[np.int64]) -> bool:
+    previous = -1
+    for key in keys:
+        pixel = (key >> 1) & _PIXEL_MASK
+        if pixel < previous:
+            return False
+        previous = pixel
+    return True
+
+
+def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
+    """Sort the keys of one frame interval by (time, pixel); equal ones keep their order.
+
+    Args:
+        keys: events in the order in which a kernel wrote them, times not before `start_us`.
+        start_us: start of the interval on the stream's clock.
+    """
+    if _in_raster_order(keys):
+        return _sort_by_time(keys, start_us)
+    return keys[np.argsort(keys >> 1, kind="stable")]
+
+
+class ReorderBuffer:
+    """Holds events back until nothing earlier can follow."""
+
+    def __init__(self) -> None:
+        self.waiting = np.empty(0, np.int64)
+
+    def push(self, keys: NDArray[np.int64], watermark_us: int) -> NDArray[np.int64]:
+        """Take sorted events and give back, sorted, all that lie before the watermark."""
+        merged = keys
+        if len(self.waiting):
+            # Only what lies among the waiting events needs merging; the rest follows them.
+            overlap = np.searchsorted(keys, (int(self.waiting[-1]) >> TIME_SHIFT) + 1 << TIME_SHIFT)
+            both = np.concatenate([self.waiting, keys[:overlap]])
+            both = both[np.argsort(both >> 1, kind="stable")]
+            merged = np.concatenate([both, keys[overlap:]])
+        ready = int(np.searchsorted(merged, watermark_us << TIME_SHIFT))
+        self.waiting = merged[ready:].copy()
+        return merged[:ready]
+
+    def flush(self) -> NDArray[np.int64]:
+        """All that still waits."""
+        rest, self.waiting = self.waiting, np.empty(0, np.int64)
+        return rest
+
+
+@njit(cache=True, nogil=True)
+def _unpack(
+    keys: NDArray[np.int64],
+    width: int,
+    origin_us: int,
+    t: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.uint8],
+) -> None:
+    columns = np.uint32(width)
+    for index in range(keys.size):
+        key = keys[index]
+        pixel = np.uint32((key >> 1) & _PIXEL_MASK)
+        row = pixel // columns
+        t[index] = (key >> TIME_SHIFT) + origin_us
+        x[index] = pixel - row * columns
+        y[index] = row
+        p[index] = key & 1
+
+
+def events_of(keys: NDArray[np.int64], height: int, width: int, origin_us: int) -> Events:
+    """The events that sorted keys stand for, on a clock on which the stream began at `origin_us`.
+
+    Example:
+        >>> events = events_of(np.array([event_key(7, 5, 1)]), height=2, width=4, origin_us=100)
+        >>> [int(value[0]) for value in (events.t, events.x, events.y, events.p)]
+        [107, 1, 1, 1]
+    """
+    count = len(keys)
+    t, p = np.empty(count, np.int64), np.empty(count, np.uint8)
+    x, y = np.empty(count, np.uint16), np.empty(count, np.uint16)
+    _unpack(keys, width, origin_us, t, x, y, p)
+    return Events(t, x, y, p, height, width)

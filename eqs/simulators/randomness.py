@@ -1,0 +1,79 @@
+"""Random numbers that depend on where they are used, never on when.
+
+Every draw is a hash of (seed, name, frame, pixel), so chunking, order and process count cannot
+change it. The hash is SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): a counter that advances by
+the golden ratio, passed through a 64-bit finaliser.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_FIRST = np.uint64(0xBF58476D1CE4E5B9)
+_SECOND = np.uint64(0x94D049BB133111EB)
+_LOW = np.uint64(0xFFFFFFFF)
+_S30, _S27, _S31, _S32, _S11 = (np.uint64(shift) for shift in (30, 27, 31, 32, 11))
+
+
+def draw_key(seed: int, *names: str) -> np.uint64:
+    """The key of one family of draws, from the seed and what the draws are for.
+
+    Example:
+        >>> len({draw_key(0, "leak"), draw_key(1, "leak"), draw_key(0, "shot"), draw_key(0, "leak")})
+        3
+    """
+    text = "\0".join((str(int(seed)), *names))
+    digest = hashlib.blake2b(text.encode(), digest_size=8).digest()
+    return np.frombuffer(digest, "<u8")[0]
+
+
+@njit(cache=True)
+def mixed(word: np.uint64) -> np.uint64:
+    """Scramble 64 bits so that neighbouring words become unrelated."""
+    word = (word ^ (word >> _S30)) * _FIRST
+    word = (word ^ (word >> _S27)) * _SECOND
+    return word ^ (word >> _S31)
+
+
+@njit(cache=True)
+def word_at(key: np.uint64, index: int) -> np.uint64:
+    """64 random bits number `index` of the family `key`; also the key of a sub-family."""
+    return mixed(key + (np.uint64(index) + np.uint64(1)) * _GOLDEN)
+
+
+@njit(cache=True)
+def uniform(word: np.uint64) -> float:
+    """A number in [0, 1) from 64 random bits."""
+    return np.float64(word >> _S11) * 2.0**-53
+
+
+@njit(cache=True)
+def normal(word: np.uint64) -> float:
+    """A standard normal number from 64 random bits (Box and Muller), at most 6.8 in size."""
+    radius = (np.float64(word >> _S32) + 0.5) * 2.0**-32
+    angle = np.float64(word & _LOW) * 2.0**-32
+    return math.sqrt(-2.0 * math.log(radius)) * math.cos(2.0 * math.pi * angle)
+
+
+@njit(cache=True)
+def normal_map(key: np.uint64, size: int) -> NDArray[np.float64]:
+    """`size` independent standard normal numbers, one for each pixel."""
+    values = np.empty(size, np.float64)
+    for pixel in range(size):
+        values[pixel] = normal(word_at(key, pixel))
+    return values
+
+
+@njit(cache=True)
+def uniform_map(key: np.uint64, size: int) -> NDArray[np.float64]:
+    """`size` independent numbers in [0, 1), one for each pixel."""
+    values = np.empty(size, np.float64)
+    for pixel in range(size):
+        values[pixel] = uniform(word_at(key, pixel))
+    return values
