@@ -1,0 +1,36 @@
+"""Scores: the Event Quality Score of two streams, and the mean average precision of detections."""
+
+from eqs.metrics.centre import Centre, feature_centres
+from eqs.metrics.corruptions import anchors
+from eqs.metrics.definition import TAPS, Definition, weights_sha256
+from eqs.metrics.detection import MeanAveragePrecision
+from eqs.metrics.eqs import EventQualityScore, load_backbone
+from eqs.metrics.features import TappedBackbone, pooled_features
+from eqs.metrics.scoring import Reading, StreamScore, score_group, score_streams
+from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine, pool_patches
+from eqs.metrics.windows import group_chunks, histogram_chunks, window_starts
+
+__all__ = [
+    "TAPS",
+    "Centre",
+    "Definition",
+    "EventQualityScore",
+    "MeanAveragePrecision",
+    "Reading",
+    "StreamScore",
+    "TappedBackbone",
+    "anchors",
+    "combine_maps",
+    "feature_centres",
+    "group_chunks",
+    "histogram_chunks",
+    "load_backbone",
+    "mean_over_stages",
+    "patch_cosine",
+    "pool_patches",
+    "pooled_features",
+    "score_group",
+    "score_streams",
+    "weights_sha256",
+    "window_starts",
+]

@@ -1,0 +1,177 @@
+"""The mean feature of real streams, which centres the score: half of a judge."""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from eqs.metrics.definition import Definition
+from eqs.metrics.features import TappedBackbone, pooled_features
+from eqs.metrics.windows import Stream, group_chunks
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Centre:
+    """The mean pooled feature of real streams: half of a judge, beside the weights.
+
+    Like the statistics of a Fréchet distance it is computed once, over the judge's own real
+    training recordings, and stored with its hash; never from the pair being scored.
+
+    Args:
+        tap: activation the mean was taken of.
+        stages: stages, counted from 1.
+        means: mean feature of each stage, float32, shape (channels,).
+        patches: patch vectors averaged, over all stages.
+    """
+
+    tap: str
+    stages: tuple[int, ...]
+    means: tuple[NDArray[np.float32], ...]
+    patches: int = 0
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the tap, the stages and the means; independent of the file's bytes."""
+        digest = hashlib.sha256(f"{self.tap} {self.stages}".encode())
+        for mean in self.means:
+            digest.update(np.ascontiguousarray(mean, dtype="<f4").tobytes())
+        return digest.hexdigest()
+
+    def save(self, path: Path | str) -> None:
+        """Write an npz file; it appears under its name only when it is complete."""
+        target = Path(path)
+        partial = target.with_name(target.name + ".partial")
+        arrays: dict[str, Any] = {
+            f"stage_{stage}": mean for stage, mean in zip(self.stages, self.means, strict=True)
+        }
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez(file, tap=self.tap, patches=self.patches, sha256=self.sha256, **arrays)
+        partial.replace(target)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Centre:
+        """Read what `save` wrote.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: the file is no centre, or its means do not match its hash.
+        """
+        source = Path(path)
+        if not source.is_file():
+            raise FileNotFoundError(
+                f"Expected a centre at {source}, got no file; set metric.centre"
+            )
+        try:
+            with np.load(source, allow_pickle=False) as data:
+                stages = tuple(sorted(int(key[6:]) for key in data if key.startswith("stage_")))
+                means = tuple(data[f"stage_{stage}"] for stage in stages)
+                tap, patches, stored = str(data["tap"]), int(data["patches"]), str(data["sha256"])
+        except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+            raise ValueError(
+                f"Expected a centre written by this package at {source}, got {error}; "
+                "delete it to have it computed again"
+            ) from error
+        centre = cls(tap=tap, stages=stages, means=means, patches=patches)
+        if centre.sha256 != stored:
+            raise ValueError(
+                f"Expected the centre at {source} to match its hash, got other values; "
+                "delete it to have it computed again"
+            )
+        return centre
+
+    def for_stages(self, stages: Sequence[int]) -> tuple[Tensor, ...]:
+        """The means of some stages as tensors.
+
+        Raises:
+            ValueError: the centre lacks a stage.
+        """
+        missing = sorted({*stages} - {*self.stages})
+        if missing:
+            raise ValueError(
+                f"Expected a centre of stages {tuple(stages)}, got one of {self.stages}; "
+                "set metric.centre or metric.stages"
+            )
+        means = dict(zip(self.stages, self.means, strict=True))
+        return tuple(torch.from_numpy(means[stage]) for stage in stages)
+
+
+def feature_centres(
+    backbone: TappedBackbone,
+    recordings: Iterable[Stream],
+    *,
+    taps: Sequence[str],
+    definition: Definition,
+    chunk_windows: int | None = None,
+    device: torch.device | str = "cpu",
+) -> dict[str, Centre]:
+    """Mean pooled feature of real recordings by tap, after each one's warm-up.
+
+    Convention: every patch of every window counts once, so long recordings weigh more.
+
+    Args:
+        backbone: the judge's network.
+        recordings: real streams, or their histograms of shape (windows, 2 * bins, height, width).
+        taps: activations to average; all come from one pass.
+        definition: stages, patches, binning and warm-up of the score to be centred.
+        chunk_windows: windows per pass; chosen from the sensor size if None.
+        device: where the backbone lives.
+
+    Raises:
+        ValueError: there is no recording, or a feature is not finite.
+    """
+    sums = {tap: [_ChannelMean() for _ in definition.stages] for tap in taps}
+    for recording in recordings:
+        chunks, windows = group_chunks([recording], definition, chunk_windows=chunk_windows)
+        skip = definition.warmup_of(windows)
+        for pooled in pooled_features(
+            backbone,
+            chunks,
+            taps=taps,
+            stages=definition.stages,
+            patch_size=definition.patch_size,
+            device=device,
+        ):
+            for tap in taps:
+                for running, stage in zip(sums[tap], pooled[tap], strict=True):
+                    running.add(stage[skip:])
+            skip = max(0, skip - len(pooled[taps[0]][0]))
+    return {
+        tap: Centre(
+            tap=tap,
+            stages=definition.stages,
+            means=tuple(running.mean() for running in by_stage),
+            patches=sum(running.count for running in by_stage),
+        )
+        for tap, by_stage in sums.items()
+    }
+
+
+class _ChannelMean:
+    """Running mean over all but the channel axis of (windows, streams, channels, rows, columns)."""
+
+    def __init__(self) -> None:
+        self.total: Tensor | None = None
+        self.count = 0
+
+    def add(self, maps: Tensor) -> None:
+        total = maps.double().sum(dim=(0, 1, 3, 4)).cpu()
+        self.total = total if self.total is None else self.total + total
+        self.count += maps.numel() // maps.shape[2]
+
+    def mean(self) -> NDArray[np.float32]:
+        if self.total is None or not self.count:
+            raise ValueError("Expected at least one real recording to centre on, got none")
+        mean = (self.total / self.count).float().numpy()
+        if not np.isfinite(mean).all():
+            raise ValueError("Expected finite features, got NaN or infinity; set metric.weights")
+        return mean

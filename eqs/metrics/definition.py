@@ -1,0 +1,126 @@
+"""What exactly a score means: every choice of the metric, with a hash of them all."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+import torch
+from torch import nn
+
+TAPS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
+
+# Choices that have one reading here. They are part of the hash, so that a later alternative
+# cannot be mistaken for this one.
+FIXED_RULES = {
+    "aggregation": "mean over patches, stages with equal weights, windows, sequences",
+    "distance": "cosine",
+    "patch": "square cells, not overlapping, padded right and bottom, mean of real cells",
+    "state": "carried from zero, one per stream",
+    "warmup": "first min(warmup_windows, n // 4) windows",
+    "zero": "both zero 1, one zero 0, eps 1e-8",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Definition:
+    """Every choice that changes an Event Quality Score, except the judge.
+
+    The judge, that is the backbone's weights and the centre of the real features, is named by its
+    own sha256 beside the score.
+
+    Convention: `warmup_windows` is an upper bound; a stream of n windows drops the first
+    `min(warmup_windows, n // 4)`.
+
+    Args:
+        tap: which activation of each stage is compared.
+        centred: whether the mean real feature is subtracted before the cosine.
+        stages: stages of the backbone, counted from 1.
+        patch_size: side of a patch in cells.
+        bins: time bins per window and polarity.
+        window_us: length of a window in microseconds.
+        count_cutoff: events per pixel and bin at which the histogram saturates.
+        span: time the bins cover, the whole `window` or first to last of its `events`.
+        warmup_windows: most windows dropped while the state settles.
+        architecture: name of the backbone with whatever changes its output besides weights.
+
+    Raises:
+        ValueError: a choice is unknown or out of range.
+
+    Example:
+        >>> Definition(tap="gate").hash == Definition(tap="hidden").hash
+        False
+    """
+
+    tap: str = "hidden"
+    centred: bool = False
+    stages: tuple[int, ...] = (1, 2, 3)
+    patch_size: int = 3
+    bins: int = 10
+    window_us: int = 50_000
+    count_cutoff: int = 10
+    span: Literal["window", "events"] = "window"
+    warmup_windows: int = 20
+    architecture: str = "rvt-small"
+
+    def __post_init__(self) -> None:
+        """Reject what no score can be computed from."""
+        if self.tap not in TAPS:
+            raise ValueError(f"Expected a tap among {TAPS}, got {self.tap!r}; set metric.tap")
+        if not self.stages or list(self.stages) != sorted({*self.stages}) or min(self.stages) < 1:
+            raise ValueError(
+                f"Expected stages counted from 1 in rising order, got {self.stages}; "
+                "set metric.stages"
+            )
+        if self.span not in ("window", "events"):
+            raise ValueError(f"Expected span window or events, got {self.span!r}; set metric.span")
+        for name in ("patch_size", "bins", "window_us", "count_cutoff"):
+            if getattr(self, name) < 1:
+                value = getattr(self, name)
+                raise ValueError(f"Expected {name} of at least 1, got {value}; set metric.{name}")
+        if self.warmup_windows < 0:
+            raise ValueError(
+                f"Expected no negative warm-up, got {self.warmup_windows}; "
+                "set metric.warmup_windows"
+            )
+
+    @property
+    def hash(self) -> str:
+        """First 12 hex digits of the sha256 of all choices as canonical JSON."""
+        choices = json.dumps({**asdict(self), **FIXED_RULES}, sort_keys=True)
+        return hashlib.sha256(choices.encode()).hexdigest()[:12]
+
+    @property
+    def column(self) -> str:
+        """Name of the reading in a table, for instance `hidden_centred` or `gate_raw`."""
+        return f"{self.tap}_{'centred' if self.centred else 'raw'}"
+
+    def warmup_of(self, windows: int) -> int:
+        """Windows dropped at the start of a stream of `windows` windows."""
+        return min(self.warmup_windows, windows // 4)
+
+
+def weights_sha256(source: Path | str | nn.Module) -> str:
+    """The sha256 of a weights file, or of a module's named tensors.
+
+    Convention: a module's hash covers names, shapes, types and values in the order of the names;
+    it differs from the hash of a file that holds the same weights.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    if not isinstance(source, nn.Module):
+        path = Path(source)
+        if not path.is_file():
+            raise FileNotFoundError(f"Expected weights at {path}, got no file; set metric.weights")
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    digest = hashlib.sha256()
+    for name, tensor in sorted(source.state_dict().items()):
+        data = tensor.detach().cpu().contiguous()
+        digest.update(f"{name} {tuple(data.shape)} {data.dtype}".encode())
+        digest.update(data.reshape(-1).view(torch.uint8).numpy().tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,112 @@
+"""Pooled features of event streams that run side by side through one backbone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor, nn
+
+from eqs.metrics.similarity import pool_patches
+
+RVT_STRIDES = (4, 8, 16, 32)
+
+# Whatever a backbone carries from one window to the next; only the backbone looks inside.
+States = Any
+
+
+class TappedBackbone(Protocol):
+    """A network that shows its inner maps.
+
+    Args:
+        x: histograms, float, shape (windows, streams, channels, height, width).
+        states: recurrent state after the previous window, None at the start.
+        stages: stages to show, counted from 1.
+        names: activations to show.
+
+    Returns:
+        By name a list by stage of maps (windows, streams, channels, rows, columns), whose rows and
+        columns beyond the image are padding, and the state after the last window.
+    """
+
+    def taps(
+        self, x: Tensor, states: States, *, stages: Sequence[int], names: Sequence[str]
+    ) -> tuple[dict[str, list[Tensor]], States]:
+        """Maps by name and stage, and the state after the last window."""
+
+
+def strides_of(backbone: object, stages: Sequence[int]) -> tuple[int, ...]:
+    """Pixels per cell of each stage: the backbone's own `strides`, else those of RVT."""
+    strides = getattr(backbone, "strides", RVT_STRIDES)
+    if max(stages) > len(strides):
+        raise ValueError(
+            f"Expected stages up to {len(strides)}, got {tuple(stages)}; set metric.stages"
+        )
+    return tuple(int(strides[stage - 1]) for stage in stages)
+
+
+def pooled_features(
+    backbone: TappedBackbone,
+    chunks: Iterable[Tensor],
+    *,
+    taps: Sequence[str],
+    stages: Sequence[int],
+    patch_size: int,
+    device: torch.device | str = "cpu",
+) -> Iterator[dict[str, list[Tensor]]]:
+    """Run streams side by side through the backbone and pool its maps.
+
+    The state is carried from chunk to chunk, one per stream, from zero. Cells that lie wholly in
+    the padding below and right of the image are cut off before pooling.
+
+    Args:
+        backbone: network with `taps`; it runs in evaluation mode and in float32.
+        chunks: histograms, shape (windows, streams, channels, height, width) each.
+        taps: activations to pool.
+        stages: stages to pool, counted from 1.
+        patch_size: side of a patch in cells.
+        device: where the backbone lives.
+
+    Yields:
+        For each chunk, by tap a list by stage of shape (windows, streams, channels, patch rows,
+        patch columns), float32.
+
+    Raises:
+        ValueError: the backbone has fewer stages.
+    """
+    strides = strides_of(backbone, stages)
+    states: States = None
+    for chunk in chunks:
+        height, width = chunk.shape[-2:]
+        with _evaluation(backbone), torch.no_grad(), _full_precision(device):
+            x = chunk.to(device=device, dtype=torch.float32)
+            maps, states = backbone.taps(x, states, stages=tuple(stages), names=tuple(taps))
+            pooled = {
+                name: [
+                    pool_patches(
+                        full[..., : -(-height // stride), : -(-width // stride)].float(), patch_size
+                    )
+                    for full, stride in zip(maps[name], strides, strict=True)
+                ]
+                for name in taps
+            }
+        yield pooled
+
+
+@contextmanager
+def _evaluation(backbone: object) -> Iterator[None]:
+    """Put a module into evaluation mode and back, so that scoring leaves no trace on it."""
+    was_training = isinstance(backbone, nn.Module) and backbone.training
+    if was_training:
+        backbone.eval()  # type: ignore[attr-defined]
+    try:
+        yield
+    finally:
+        if was_training:
+            backbone.train()  # type: ignore[attr-defined]
+
+
+def _full_precision(device: torch.device | str) -> torch.autocast:
+    return torch.autocast(torch.device(device).type, enabled=False)

@@ -1,0 +1,242 @@
+"""Scores of event streams against a reference stream, in one pass of the backbone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from eqs.metrics.centre import Centre
+from eqs.metrics.definition import Definition
+from eqs.metrics.features import TappedBackbone, pooled_features, strides_of
+from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine
+from eqs.metrics.windows import Stream, group_chunks
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StreamScore:
+    """How similar one stream is to the reference, and where and when.
+
+    Args:
+        score: mean over windows after the warm-up, in [-1, 1], higher is better.
+        by_stage: the same for each stage alone.
+        map: mean over windows and stages, by patch of the finest stage, shape (rows, columns).
+        patch_px: side of a patch of the map in pixels.
+        curve: score of every window, warm-up included, shape (windows,).
+        warmup: windows at the start that do not count.
+    """
+
+    score: float
+    by_stage: tuple[float, ...]
+    map: NDArray[np.float64]
+    patch_px: int
+    curve: NDArray[np.float64]
+    warmup: int
+
+    @property
+    def distance(self) -> float:
+        """One minus the score; lower is better."""
+        return 1.0 - self.score
+
+    @property
+    def n_windows(self) -> int:
+        """Windows that count."""
+        return len(self.curve) - self.warmup
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """One way to read the same features: a definition with the centre it needs.
+
+    Args:
+        definition: every choice of the score.
+        centre: mean real feature; needed where the definition is centred.
+
+    Raises:
+        ValueError: the centre is missing, not asked for, or of another tap.
+    """
+
+    definition: Definition
+    centre: Centre | None = None
+
+    def __post_init__(self) -> None:
+        """Check that definition and centre belong together."""
+        if self.definition.centred != (self.centre is not None):
+            wanted, got = ("a", "none") if self.centre is None else ("no", "one")
+            raise ValueError(
+                f"Expected {wanted} centre for a definition with centred={self.definition.centred},"
+                f" got {got}; set metric.centre or metric.centred"
+            )
+        if self.centre is not None and self.centre.tap != self.definition.tap:
+            raise ValueError(
+                f"Expected a centre of tap {self.definition.tap}, got one of {self.centre.tap}; "
+                "set metric.centre or metric.tap"
+            )
+
+    @property
+    def name(self) -> str:
+        """Name of the column in a table, for instance `hidden_centred`."""
+        return self.definition.column
+
+
+def score_group(
+    backbone: TappedBackbone,
+    chunks: Iterable[Tensor],
+    n_windows: int,
+    readings: Sequence[Reading],
+    *,
+    device: torch.device | str = "cpu",
+) -> list[dict[str, StreamScore]]:
+    """Score many streams against one reference, under many readings, in one pass.
+
+    The reference runs through the backbone once, whatever the number of candidates; memory does
+    not grow with the length of the streams.
+
+    Args:
+        backbone: the judge's network.
+        chunks: histograms, shape (windows, 1 + candidates, 2 * bins, height, width) each; the
+            reference comes first.
+        n_windows: windows in all chunks together.
+        readings: readings that differ only in tap and centring.
+        device: where the backbone lives.
+
+    Returns:
+        For each candidate the scores by name of the reading.
+
+    Raises:
+        ValueError: the readings do not share one pass, or a feature is not finite.
+    """
+    first = _shared_pass(readings)
+    taps = sorted({reading.definition.tap for reading in readings})
+    strides = strides_of(backbone, first.stages)
+    totals = {
+        reading.name: _Tally(reading, first.warmup_of(n_windows), strides) for reading in readings
+    }
+    for pooled in pooled_features(
+        backbone,
+        chunks,
+        taps=taps,
+        stages=first.stages,
+        patch_size=first.patch_size,
+        device=device,
+    ):
+        for tally in totals.values():
+            tally.add(pooled[tally.tap])
+    by_reading = {name: tally.scores() for name, tally in totals.items()}
+    candidates = len(next(iter(by_reading.values())))
+    return [
+        {name: scores[index] for name, scores in by_reading.items()} for index in range(candidates)
+    ]
+
+
+def score_streams(
+    backbone: TappedBackbone,
+    reference: Stream,
+    candidates: Sequence[Stream],
+    readings: Sequence[Reading],
+    *,
+    start_us: int | None = None,
+    stop_us: int | None = None,
+    chunk_windows: int | None = None,
+    device: torch.device | str = "cpu",
+) -> list[dict[str, StreamScore]]:
+    """Cut streams into their common windows and score the candidates against the reference.
+
+    Args:
+        backbone: the judge's network.
+        reference: real stream, or its histograms of shape (windows, 2 * bins, height, width).
+        candidates: streams of the same kind, sensor and clock.
+        readings: readings that differ only in tap and centring.
+        start_us: start of the first window; by default where all streams have begun.
+        stop_us: time that no window may pass; by default where the first stream ends.
+        chunk_windows: windows per pass; chosen from the sensor size if None.
+        device: where the backbone lives.
+
+    Returns:
+        For each candidate the scores by name of the reading.
+
+    Raises:
+        ValueError: sensors or shapes differ, or the streams do not share a whole window.
+    """
+    chunks, windows = group_chunks(
+        [reference, *candidates],
+        _shared_pass(readings),
+        start_us=start_us,
+        stop_us=stop_us,
+        chunk_windows=chunk_windows,
+    )
+    return score_group(backbone, chunks, windows, readings, device=device)
+
+
+def _shared_pass(readings: Sequence[Reading]) -> Definition:
+    """The choices that all readings share, or an error where they do not."""
+    shared = {
+        (d.stages, d.patch_size, d.bins, d.window_us, d.count_cutoff, d.span, d.warmup_windows)
+        for d in (reading.definition for reading in readings)
+    }
+    if len(shared) != 1 or len({reading.name for reading in readings}) < len(readings):
+        raise ValueError(
+            "Expected readings that differ in tap or centring and share all other choices, got "
+            f"{[reading.name for reading in readings]} with {len(shared)} sets of other choices"
+        )
+    return readings[0].definition
+
+
+class _Tally:
+    """Running sums of one reading over the chunks of a group of streams."""
+
+    def __init__(self, reading: Reading, warmup: int, strides: Sequence[int]) -> None:
+        definition = reading.definition
+        self.tap = definition.tap
+        self.patch_size = definition.patch_size
+        self.warmup, self.strides = warmup, strides
+        means = reading.centre.for_stages(definition.stages) if reading.centre else None
+        self.centres: Sequence[Tensor | None] = means or [None] * len(strides)
+        self.seen = 0
+        self.curves: list[Tensor] = []
+        self.maps: list[Tensor] | None = None
+
+    def add(self, pooled: Sequence[Tensor]) -> None:
+        """Compare a chunk's streams, by stage (windows, streams, channels, rows, columns)."""
+        cosines = [
+            patch_cosine(stage[:, 1:], stage[:, :1], centre)
+            for stage, centre in zip(pooled, self.centres, strict=True)
+        ]
+        by_stage = torch.stack([mean_over_stages([cosine]) for cosine in cosines], dim=-1)
+        self.curves.append(by_stage.cpu())
+        skip = max(0, self.warmup - self.seen)
+        kept = [cosine[skip:].double().sum(dim=0).cpu() for cosine in cosines]
+        self.maps = (
+            kept if self.maps is None else [a + b for a, b in zip(self.maps, kept, strict=True)]
+        )
+        self.seen += len(by_stage)
+
+    def scores(self) -> list[StreamScore]:
+        """One score per candidate."""
+        if self.maps is None:
+            raise ValueError("Expected at least one window, got none")
+        curve = torch.cat(self.curves)
+        by_stage = curve[self.warmup :].mean(dim=0)
+        if not torch.isfinite(by_stage).all():
+            raise ValueError(
+                "Expected finite features, got NaN or infinity; set metric.weights to a sound "
+                "checkpoint"
+            )
+        image = combine_maps(
+            [total / (self.seen - self.warmup) for total in self.maps], self.strides
+        )
+        return [
+            StreamScore(
+                score=float(by_stage[index].mean()),
+                by_stage=tuple(by_stage[index].tolist()),
+                map=image[index].numpy(),
+                patch_px=self.patch_size * min(self.strides),
+                curve=curve[:, index].mean(dim=-1).numpy(),
+                warmup=self.warmup,
+            )
+            for index in range(curve.shape[1])
+        ]

@@ -1,0 +1,126 @@
+"""Patch similarity of two feature maps: the arithmetic of the Event Quality Score."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+
+def pool_patches(maps: Tensor, size: int = 3) -> Tensor:
+    """Mean feature vector of every patch of `size` by `size` neighbouring cells.
+
+    Convention: patches do not overlap. Where the map is no multiple of `size`, it is padded with
+    zeros on the right and at the bottom, and a ragged patch is divided by its real cells. The
+    divisor leaves a raw cosine as it is; a centred cosine needs the true mean.
+
+    Args:
+        maps: feature maps, shape (..., channels, rows, columns).
+        size: side of a patch in cells.
+
+    Returns:
+        Shape (..., channels, patch rows, patch columns), both counts rounded up.
+
+    Example:
+        >>> pool_patches(torch.ones(2, 4, 3)).shape
+        torch.Size([2, 2, 1])
+    """
+    if size < 1:
+        raise ValueError(f"Expected patches of at least one cell, got {size}; set patch_size")
+    flat = maps.reshape(-1, *maps.shape[-3:])
+    pooled = F.avg_pool2d(flat, size, ceil_mode=True)
+    return pooled.reshape(*maps.shape[:-2], *pooled.shape[-2:])
+
+
+def patch_cosine(a: Tensor, b: Tensor, centre: Tensor | None = None, eps: float = 1e-8) -> Tensor:
+    r"""Cosine between the feature vectors of two streams, patch by patch.
+
+    .. math:: \cos(a, b) = \frac{(a - m) \cdot (b - m)}{\|a - m\| \, \|b - m\|}
+
+    Convention: a vector no longer than `eps` counts as zero. Two zero vectors are equal and score
+    1; a zero vector beside any other scores 0. `eps` is a threshold, never added to a norm, so
+    that identical vectors score 1 however short they are.
+
+    Args:
+        a: pooled features of one stream, shape (..., channels, rows, columns).
+        b: pooled features of the other stream, same shape or one that broadcasts to it.
+        centre: mean feature vector `m`, shape (channels,), subtracted from both.
+        eps: length up to which a vector counts as zero.
+
+    Returns:
+        Values in [-1, 1], shape (..., rows, columns).
+
+    Raises:
+        ValueError: the centre has another number of channels.
+
+    Example:
+        >>> x = torch.tensor([1.0, 0.0]).view(2, 1, 1)
+        >>> y = torch.tensor([0.5, 0.75**0.5]).view(2, 1, 1)
+        >>> round(patch_cosine(x, y).item(), 6)
+        0.5
+    """
+    if centre is not None:
+        if centre.shape != (a.shape[-3],):
+            raise ValueError(
+                f"Expected a centre of {a.shape[-3]} channels, got shape {tuple(centre.shape)}; "
+                "set metric.centre to the centre of this backbone and tap"
+            )
+        column = centre.to(a)[:, None, None]
+        a, b = a - column, b - column
+    length_a = torch.linalg.vector_norm(a, dim=-3)
+    length_b = torch.linalg.vector_norm(b, dim=-3)
+    unit_a = a / length_a.clamp_min(eps).unsqueeze(-3)
+    unit_b = b / length_b.clamp_min(eps).unsqueeze(-3)
+    zero_a, zero_b = length_a <= eps, length_b <= eps
+    cosine = (unit_a * unit_b).sum(dim=-3).clamp(-1.0, 1.0)
+    return torch.where(zero_a | zero_b, (zero_a & zero_b).to(cosine.dtype), cosine)
+
+
+def mean_over_stages(stages: Sequence[Tensor]) -> Tensor:
+    """Mean over patches in each stage, then over stages with equal weights.
+
+    Convention: equal weights, not patch counts, because those would give the first of three
+    stages more than three quarters of the score.
+
+    Args:
+        stages: patch similarities by stage, shape (..., rows, columns) each.
+
+    Returns:
+        Shape (...), float64.
+    """
+    return torch.stack([stage.double().mean(dim=(-2, -1)) for stage in stages]).mean(dim=0)
+
+
+def combine_maps(stages: Sequence[Tensor], strides: Sequence[int]) -> Tensor:
+    """Mean of the stages' patch maps on the grid of the finest stage.
+
+    Every coarse patch is repeated over the fine patches whose top left pixel it covers. Ragged
+    patches weigh as much as full ones within a stage but not after the repetition, so the mean of
+    this map may differ slightly from the score.
+
+    Args:
+        stages: patch similarities by stage, shape (..., rows, columns) each.
+        strides: pixels per cell in each stage.
+
+    Returns:
+        Shape (..., rows of the finest stage, columns of the finest stage).
+
+    Example:
+        >>> combine_maps([torch.zeros(2, 2), torch.ones(1, 1)], [4, 8])
+        tensor([[0.5000, 0.5000],
+                [0.5000, 0.5000]])
+    """
+    finest = min(range(len(stages)), key=lambda index: strides[index])
+    rows, columns = stages[finest].shape[-2:]
+    total = torch.zeros_like(stages[finest])
+    for stage, stride in zip(stages, strides, strict=True):
+        at_row = torch.arange(rows, device=stage.device) * strides[finest] // stride
+        at_column = torch.arange(columns, device=stage.device) * strides[finest] // stride
+        at_row, at_column = (
+            at_row.clamp_max(stage.shape[-2] - 1),
+            at_column.clamp_max(stage.shape[-1] - 1),
+        )
+        total = total + stage[..., at_row[:, None], at_column[None, :]]
+    return total / len(stages)

@@ -1,0 +1,208 @@
+"""Several event streams cut into the same windows, as histograms for one batched pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from eqs.events import Events
+from eqs.metrics.definition import Definition
+from eqs.representations import stacked_histogram
+
+# Pixels of all frames in one pass of the backbone. Eight 640x480 frames keep the first stage's
+# activations below half a gigabyte, and small sensors still come in long, efficient chunks.
+PIXELS_PER_CHUNK = 8 * 480 * 640
+LONGEST_CHUNK = 32
+
+
+class EventSource(Protocol):
+    """What a stream must offer: `Events` in memory and readers of files both do."""
+
+    @property
+    def height(self) -> int:
+        """Rows of the sensor."""
+
+    @property
+    def width(self) -> int:
+        """Columns of the sensor."""
+
+    def __len__(self) -> int:
+        """Number of events."""
+
+    def window(self, start_us: int, stop_us: int) -> Events:
+        """The events with `start_us <= t < stop_us`."""
+
+
+Stream = EventSource | Tensor
+
+
+def extent_us(stream: EventSource) -> tuple[int, int] | None:
+    """First event's time and the time just after the last event; None without events."""
+    if not len(stream):
+        return None
+    if isinstance(stream, Events):
+        return int(stream.t[0]), int(stream.t[-1]) + 1
+    return int(stream.start_us), int(stream.stop_us)  # type: ignore[attr-defined]
+
+
+def check_sensors(streams: Sequence[EventSource]) -> None:
+    """Refuse streams of different sensors.
+
+    Raises:
+        ValueError: the sensor sizes differ.
+    """
+    sizes = [f"{stream.width}x{stream.height}" for stream in streams]
+    if len(set(sizes)) > 1:
+        raise ValueError(
+            f"Expected streams of one sensor size, got {' and '.join(dict.fromkeys(sizes))}; "
+            "simulate at the size of the real sensor"
+        )
+
+
+def window_starts(
+    streams: Sequence[EventSource],
+    window_us: int,
+    start_us: int | None = None,
+    stop_us: int | None = None,
+) -> NDArray[np.int64]:
+    """Start times of the consecutive full windows that all streams share.
+
+    Convention: without explicit limits the windows begin at the latest first event and end at the
+    earliest last event. A stream without events has no extent and sets no limit; it is scored as
+    silence over the extent of the others. A remainder shorter than a window is dropped.
+
+    Args:
+        streams: streams on one clock.
+        window_us: length of a window in microseconds.
+        start_us: start of the first window.
+        stop_us: time that no window may pass.
+
+    Raises:
+        ValueError: the streams do not overlap in time, the overlap is shorter than one window, or
+            no stream has events and a limit is missing.
+    """
+    extents = [extent for extent in map(extent_us, streams) if extent is not None]
+    if not extents and (start_us is None or stop_us is None):
+        raise ValueError(
+            "Expected events in at least one stream, got none; give start_us and stop_us"
+        )
+    start = max(first for first, _ in extents) if start_us is None else start_us
+    stop = min(last for _, last in extents) if stop_us is None else stop_us
+    if stop <= start:
+        raise ValueError(
+            f"Expected streams that overlap in time, got a common stretch from {start} us to "
+            f"{stop} us; put both on one clock, for instance with Events.shifted"
+        )
+    count = (stop - start) // window_us
+    if count < 1:
+        raise ValueError(
+            f"Expected at least one window of {window_us} us, got an overlap of {stop - start} us; "
+            "give longer streams or set metric.window_us"
+        )
+    return start + window_us * np.arange(count, dtype=np.int64)
+
+
+def chunk_length(streams: int, height: int, width: int) -> int:
+    """Windows per pass that keep the memory of a pass about constant."""
+    return max(1, min(LONGEST_CHUNK, PIXELS_PER_CHUNK // (streams * height * width)))
+
+
+def group_chunks(
+    streams: Sequence[Stream],
+    definition: Definition,
+    *,
+    start_us: int | None = None,
+    stop_us: int | None = None,
+    chunk_windows: int | None = None,
+) -> tuple[Iterator[Tensor], int]:
+    """Histograms of streams side by side, and the number of windows they share.
+
+    Args:
+        streams: event streams of one sensor on one clock, or histograms of one shape
+            (windows, 2 * bins, height, width).
+        definition: bins, window length, cutoff and span.
+        start_us: start of the first window, for event streams.
+        stop_us: time that no window may pass, for event streams.
+        chunk_windows: windows per chunk; chosen from the sensor size if None.
+
+    Returns:
+        Chunks of shape (windows, streams, 2 * bins, height, width), and the windows in all.
+
+    Raises:
+        ValueError: streams and histograms are mixed, shapes or sensors differ, or the streams do
+            not share a whole window.
+    """
+    tensors = [stream for stream in streams if isinstance(stream, Tensor)]
+    if not tensors:
+        events = [stream for stream in streams if not isinstance(stream, Tensor)]
+        check_sensors(events)
+        starts = window_starts(events, definition.window_us, start_us, stop_us)
+        return histogram_chunks(events, starts, definition, chunk_windows), len(starts)
+    if len(tensors) < len(streams):
+        raise ValueError("Expected event streams or histograms, got both; convert one of them")
+    _check_histograms(tensors, definition.bins)
+    return _tensor_chunks(tensors, chunk_windows), len(tensors[0])
+
+
+def _check_histograms(tensors: Sequence[Tensor], bins: int) -> None:
+    shapes = [tuple(tensor.shape) for tensor in tensors]
+    if len(set(shapes)) > 1:
+        raise ValueError(
+            f"Expected histograms of one shape, got {' and '.join(map(str, dict.fromkeys(shapes)))}"
+        )
+    if len(shapes[0]) != 4 or shapes[0][1] != 2 * bins or not shapes[0][0]:
+        raise ValueError(
+            f"Expected histograms of shape (windows, {2 * bins}, height, width) with at least one "
+            f"window, got {shapes[0]}; set metric.bins"
+        )
+    if not all(torch.isfinite(tensor).all() for tensor in tensors if tensor.is_floating_point()):
+        raise ValueError("Expected finite histograms, got NaN or infinity")
+
+
+def _tensor_chunks(tensors: Sequence[Tensor], chunk_windows: int | None) -> Iterator[Tensor]:
+    length = chunk_windows or chunk_length(len(tensors), *map(int, tensors[0].shape[-2:]))
+    for first in range(0, len(tensors[0]), length):
+        yield torch.stack([tensor[first : first + length] for tensor in tensors], dim=1)
+
+
+def histogram_chunks(
+    streams: Sequence[EventSource],
+    starts_us: NDArray[np.int64],
+    definition: Definition,
+    chunk_windows: int | None = None,
+) -> Iterator[Tensor]:
+    """The streams' histograms, a few windows at a time.
+
+    Args:
+        streams: streams of one sensor size.
+        starts_us: start time of each window.
+        definition: bins, window length, cutoff and span.
+        chunk_windows: windows per chunk; chosen from the sensor size if None.
+
+    Yields:
+        uint8 of shape (windows, streams, 2 * bins, height, width).
+    """
+    length = chunk_windows or chunk_length(len(streams), streams[0].height, streams[0].width)
+    for first in range(0, len(starts_us), length):
+        chunk = [
+            [_histogram(stream, int(start), definition) for stream in streams]
+            for start in starts_us[first : first + length]
+        ]
+        yield torch.from_numpy(np.stack([np.stack(windows) for windows in chunk]))
+
+
+def _histogram(stream: EventSource, start_us: int, definition: Definition) -> NDArray[np.uint8]:
+    stop_us = start_us + definition.window_us
+    return stacked_histogram(
+        stream.window(start_us, stop_us),
+        bins=definition.bins,
+        start_us=start_us,
+        stop_us=stop_us,
+        count_cutoff=definition.count_cutoff,
+        span=definition.span,
+    )
