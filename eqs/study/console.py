@@ -1,0 +1,43 @@
+"""The study's tables on a terminal."""
+
+from __future__ import annotations
+
+import pandas as pd
+from rich.console import Console
+from rich.table import Table as ConsoleTable
+
+from eqs.study.layout import Table, number
+from eqs.study.tables import MAP_COLUMNS, Drops, score_columns, summarise_eqs, summarise_study
+
+
+def print_study(study: pd.DataFrame, console: Console) -> None:
+    """Print mAP and drops of every system, means over seeds, times 100 as the paper does."""
+    systems = summarise_study(study)
+    names = ["system", "seeds", *MAP_COLUMNS, *Drops._fields, "eqs"]
+    console.print(_drawn(_chosen(systems, names), "Detection accuracy (mAP, drops: x 100)"))
+
+
+def print_eqs(eqs: pd.DataFrame, console: Console) -> None:
+    """Print every score of every system, means over sequences, with chance and ceiling."""
+    means = summarise_eqs(eqs)
+    names = ["system", "sequences", "eqs", "eqs_chance", "eqs_ceiling", "eqs_scaled"]
+    variants = [name for name in score_columns(means) if name != "eqs"]
+    console.print(_drawn(_chosen(means, names), "Event Quality Score (higher is better)"))
+    if variants:
+        console.print(_drawn(_chosen(means, ["system", *variants]), "EQS by activation"))
+
+
+def _chosen(frame: pd.DataFrame, names: list[str]) -> Table:
+    rows = tuple(
+        tuple(number(row[name], name) for name in names) for row in frame.to_dict("records")
+    )
+    return Table(header=tuple(names), rows=rows)
+
+
+def _drawn(table: Table, title: str) -> ConsoleTable:
+    drawn = ConsoleTable(title=title)
+    for place, name in enumerate(table.header):
+        drawn.add_column(name, justify="right" if place else "left")
+    for row in table.rows:
+        drawn.add_row(*row)
+    return drawn
