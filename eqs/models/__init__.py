@@ -1,0 +1,20 @@
+"""RVT detectors: backbone, pyramid, head, loss, postprocessing, checkpoints."""
+
+from eqs.models.backbone import TAPS, RVTBackbone
+from eqs.models.detector import SIZES, RVTDetector
+from eqs.models.loss import detection_loss
+from eqs.models.postprocess import postprocess
+from eqs.models.states import States, detach_states, gather_frames, reset_states
+
+__all__ = [
+    "SIZES",
+    "TAPS",
+    "RVTBackbone",
+    "RVTDetector",
+    "States",
+    "detach_states",
+    "detection_loss",
+    "gather_frames",
+    "postprocess",
+    "reset_states",
+]

@@ -1,0 +1,121 @@
+"""Reading weights from published and from our own checkpoints."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+STEM = "backbone.stages.0.downsample_cf2cl.conv.weight"
+CLASS_BIAS = "yolox_head.cls_preds.0.bias"
+CLASS_LAYERS = "yolox_head.cls_preds."
+LISTED = 5
+
+
+class WeightShape(NamedTuple):
+    """What the shapes of a detector's weights say about it."""
+
+    embed_dim: int
+    in_channels: int
+    num_classes: int
+
+
+def read_weights(path: str | Path) -> dict[str, Tensor]:
+    """Detector weights by their published names, from a file.
+
+    Lightning checkpoints keep them under `state_dict` behind a prefix (`mdl.` in published ones);
+    entries of other modules are left out. Nothing but tensors and plain values is unpickled.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: not a checkpoint, no detector in it, or several.
+    """
+    if not Path(path).is_file():
+        raise FileNotFoundError(
+            f"Expected a checkpoint at {path}, got no such file; set model.weights"
+        )
+    try:
+        content = torch.load(path, map_location="cpu", weights_only=True)
+    except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError, ValueError) as error:
+        raise ValueError(
+            f"Expected a checkpoint of tensors and plain values in {path}, got a file that "
+            f"torch.load with weights_only=True refuses; set model.weights to another file"
+        ) from error
+    entries = content.get("state_dict", content) if isinstance(content, dict) else {}
+    tensors = {str(name): x for name, x in entries.items() if isinstance(x, Tensor)}
+    prefixes = [name.removesuffix(STEM) for name in tensors if name.endswith(STEM)]
+    if len(prefixes) != 1:
+        raise ValueError(
+            f"Expected one RVT detector in {path}, got {len(prefixes)}; no or several entries end "
+            f"in {STEM}"
+        )
+    prefix = prefixes[0]
+    return {name.removeprefix(prefix): x for name, x in tensors.items() if name.startswith(prefix)}
+
+
+def shape_of(weights: dict[str, Tensor], path: str | Path) -> WeightShape:
+    """Widths and class count that the weights imply.
+
+    Raises:
+        ValueError: the entries that tell them are missing.
+    """
+    if CLASS_BIAS not in weights:
+        raise ValueError(f"Expected an entry {CLASS_BIAS} in {path}, got none")
+    embed_dim, in_channels = weights[STEM].shape[:2]
+    return WeightShape(embed_dim, in_channels, len(weights[CLASS_BIAS]))
+
+
+def load_weights(model: nn.Module, path: str | Path, *, new_class_branch: bool = False) -> None:
+    """Load a checkpoint into a detector; every entry must be there, with its shape.
+
+    Args:
+        model: the detector.
+        path: checkpoint file.
+        new_class_branch: leave the layers that depend on the number of classes as they are
+            where that number differs.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: missing, unexpected or differently shaped entries.
+    """
+    weights = read_weights(path)
+    own = model.state_dict()
+    classes = len(own[CLASS_BIAS])
+    stored = shape_of(weights, path).num_classes
+    if stored != classes:
+        if not new_class_branch:
+            raise ValueError(
+                f"Expected weights for {classes} classes, got {stored} in {path}; set "
+                "model.new_class_branch=true to start the class layers anew"
+            )
+        anew = {name: x for name, x in own.items() if name.startswith(CLASS_LAYERS)}
+        weights = {**weights, **anew}
+    _check_entries(own, weights, path)
+    model.load_state_dict(weights)
+
+
+def _check_entries(own: dict[str, Tensor], weights: dict[str, Tensor], path: str | Path) -> None:
+    problems = {
+        "missing": [name for name in own if name not in weights],
+        "unexpected": [name for name in weights if name not in own],
+        "differently shaped": [
+            f"{name} {tuple(weights[name].shape)} instead of {tuple(x.shape)}"
+            for name, x in own.items()
+            if name in weights and weights[name].shape != x.shape
+        ],
+    }
+    if any(problems.values()):
+        found = "; ".join(f"{kind}: {_shortened(names)}" for kind, names in problems.items())
+        raise ValueError(
+            f"Expected the {len(own)} entries of this detector in {path}, got {found}; set "
+            "model.size and model.in_channels to the checkpoint's"
+        )
+
+
+def _shortened(names: list[str]) -> str:
+    if len(names) <= LISTED:
+        return ", ".join(names) or "none"
+    return f"{', '.join(names[:LISTED])} and {len(names) - LISTED} more"
