@@ -72,7 +72,7 @@ class Centre:
                 f"Expected a centre at {source}, got no file; set metric.centre"
             )
         try:
-            with np.load(source, allow_pickle=False) as data:
+            with source.open("rb") as file, np.load(file, allow_pickle=False) as data:
                 stages = tuple(sorted(int(key[6:]) for key in data if key.startswith("stage_")))
                 means = tuple(data[f"stage_{stage}"] for stage in stages)
                 tap, patches, stored = str(data["tap"]), int(data["patches"]), str(data["sha256"])

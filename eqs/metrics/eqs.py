@@ -229,7 +229,17 @@ def load_backbone(
     else:
         digest = weights_sha256(weights)
         model = RVTDetector.from_checkpoint(weights, partition_split_32=partition_split_32)
+        _check_fit(model.size, size, "size")
+        _check_fit(model.backbone.in_channels, 2 * bins, "bins")
     return model.backbone.eval().requires_grad_(False), digest
+
+
+def _check_fit(found: str | int, wanted: str | int, key: str) -> None:
+    if found != wanted:
+        what = "a backbone of size" if key == "size" else "weights for input channels"
+        raise ValueError(
+            f"Expected {what} {wanted}, got {found}; set metric.{key} or metric.weights"
+        )
 
 
 def _as_centre(

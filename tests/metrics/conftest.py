@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 import torch
@@ -20,8 +22,7 @@ class SmallBackbone(nn.Module):
         generator = torch.Generator().manual_seed(seed)
         widths = [2 * bins, channels, 2 * channels, 4 * channels]
         self.convolutions = nn.ModuleList(
-            nn.Conv2d(before, after, 2, stride=2)
-            for before, after in zip(widths[:-1], widths[1:], strict=True)
+            nn.Conv2d(before, after, 2, stride=2) for before, after in itertools.pairwise(widths)
         )
         for parameter in self.parameters():
             parameter.data = torch.randn(parameter.shape, generator=generator) * 0.4

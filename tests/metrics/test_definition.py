@@ -1,0 +1,79 @@
+"""The definition's hash and its refusals."""
+
+from dataclasses import fields, replace
+
+import pytest
+import torch
+
+from eqs.metrics import Definition, weights_sha256
+from eqs.metrics.definition import FIXED_RULES
+
+OTHER = {
+    "tap": "gate",
+    "centred": True,
+    "stages": (1, 2),
+    "patch_size": 2,
+    "bins": 5,
+    "window_us": 40_000,
+    "count_cutoff": 8,
+    "span": "events",
+    "warmup_windows": 10,
+    "architecture": "other",
+}
+
+
+def test_every_choice_changes_the_hash():
+    base = Definition()
+    hashes = {base.hash} | {replace(base, **{key: value}).hash for key, value in OTHER.items()}
+    assert OTHER.keys() == {field.name for field in fields(Definition)}
+    assert len(hashes) == len(OTHER) + 1
+
+
+def test_hash_is_short_and_repeats():
+    assert Definition().hash == Definition().hash
+    assert len(Definition().hash) == 12
+
+
+def test_fixed_rules_are_part_of_the_hash(monkeypatch):
+    before = Definition().hash
+    monkeypatch.setitem(FIXED_RULES, "distance", "another")
+    assert Definition().hash != before
+
+
+@pytest.mark.parametrize(("windows", "warmup"), [(1, 0), (3, 0), (9, 2), (40, 10), (400, 20)])
+def test_warmup_is_at_most_a_quarter(windows, warmup):
+    assert Definition().warmup_of(windows) == warmup
+
+
+@pytest.mark.parametrize(
+    ("choice", "message"),
+    [
+        ({"tap": "nose"}, "tap among .* got 'nose'; set metric.tap"),
+        ({"stages": ()}, "stages counted from 1"),
+        ({"stages": (2, 1)}, "stages counted from 1"),
+        ({"stages": (0, 1)}, "stages counted from 1"),
+        ({"span": "all"}, "span window or events"),
+        ({"window_us": 0}, "window_us of at least 1"),
+        ({"warmup_windows": -1}, "no negative warm-up"),
+    ],
+)
+def test_impossible_choices_are_refused(choice, message):
+    with pytest.raises(ValueError, match=message):
+        Definition(**choice)
+
+
+def test_weights_hash_sees_values_and_names(tmp_path):
+    a, b = torch.nn.Linear(2, 2), torch.nn.Linear(2, 2)
+    b.load_state_dict(a.state_dict())
+    assert weights_sha256(a) == weights_sha256(b)
+    with torch.no_grad():
+        b.bias[0] += 1
+    assert weights_sha256(a) != weights_sha256(b)
+    assert weights_sha256(a) != weights_sha256(torch.nn.Sequential(a))
+    (tmp_path / "w.ckpt").write_bytes(b"abc")
+    assert weights_sha256(tmp_path / "w.ckpt").startswith("ba7816bf8f01cfea")
+
+
+def test_missing_weights_are_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"gone.ckpt, got no file; set metric.weights"):
+        weights_sha256(tmp_path / "gone.ckpt")

@@ -1,0 +1,300 @@
+"""The Event Quality Score: identities, invariances, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from eqs.events import Events
+from eqs.metrics import (
+    Centre,
+    Definition,
+    EventQualityScore,
+    Reading,
+    feature_centres,
+    patch_cosine,
+    pool_patches,
+    score_streams,
+)
+
+BASE = Definition(bins=2, window_us=50_000)
+TAPS = ("gate", "hidden", "downsample")
+
+
+def readings(*taps, centres=None):
+    raw = [Reading(definition=replace(BASE, tap=tap)) for tap in taps]
+    return raw + [
+        Reading(definition=replace(BASE, tap=tap, centred=True), centre=centre)
+        for tap, centre in (centres or {}).items()
+    ]
+
+
+@pytest.fixture
+def centres(backbone, make_events):
+    return feature_centres(backbone, [make_events(11), make_events(12)], taps=TAPS, definition=BASE)
+
+
+def test_identical_streams_score_one(backbone, make_events, centres):
+    events = make_events(1)
+    (scores,) = score_streams(backbone, events, [events], readings(*TAPS, centres=centres))
+    assert set(scores) == {f"{tap}_{kind}" for tap in TAPS for kind in ("raw", "centred")}
+    for score in scores.values():
+        assert score.score == pytest.approx(1, abs=1e-6)
+        np.testing.assert_allclose(score.map, 1, atol=1e-6)
+        np.testing.assert_allclose(score.curve, 1, atol=1e-6)
+
+
+def test_score_is_symmetric(backbone, make_events, centres):
+    a, b = make_events(1), make_events(2, count=1500)
+    limits = {"start_us": 0, "stop_us": 1_000_000}
+    (there,) = score_streams(backbone, a, [b], readings(*TAPS, centres=centres), **limits)
+    (back,) = score_streams(backbone, b, [a], readings(*TAPS, centres=centres), **limits)
+    for name, score in there.items():
+        assert back[name].score == pytest.approx(score.score, abs=1e-5)
+        assert score.score < 0.999
+
+
+@pytest.mark.parametrize("chunk_windows", [1, 7, 100])
+def test_chunk_length_does_not_matter(backbone, make_events, centres, chunk_windows):
+    real, candidates = make_events(1), [make_events(2)]
+    ways = readings(*TAPS, centres=centres)
+    (expected,) = score_streams(backbone, real, candidates, ways, chunk_windows=3)
+    (scores,) = score_streams(backbone, real, candidates, ways, chunk_windows=chunk_windows)
+    for name, score in scores.items():
+        assert score.score == pytest.approx(expected[name].score, abs=1e-5)
+        np.testing.assert_allclose(score.curve, expected[name].curve, atol=1e-5)
+        np.testing.assert_allclose(score.map, expected[name].map, atol=1e-5)
+
+
+def test_candidates_do_not_see_each_other(backbone, make_events):
+    real = make_events(1)
+    candidates = [make_events(seed, count=500 * seed) for seed in (2, 3, 4)]
+    limits = {"start_us": 100_000, "stop_us": 900_000}
+    together = score_streams(backbone, real, candidates, readings("hidden"), **limits)
+    alone = [
+        score_streams(backbone, real, [each], readings("hidden"), **limits)[0]
+        for each in candidates
+    ]
+    for a, b in zip(together, alone, strict=True):
+        assert a["hidden_raw"].score == pytest.approx(b["hidden_raw"].score, abs=1e-5)
+    assert len({round(each["hidden_raw"].score, 4) for each in together}) == 3
+
+
+def test_clocks_may_be_moved_together(backbone, make_events):
+    a, b = make_events(1), make_events(2)
+    (here,) = score_streams(backbone, a, [b], readings("hidden"))
+    (there,) = score_streams(backbone, a.shifted(777_123), [b.shifted(777_123)], readings("hidden"))
+    assert there["hidden_raw"].score == pytest.approx(here["hidden_raw"].score, abs=1e-9)
+
+
+def test_score_is_the_mean_over_patches_stages_and_windows_after_warmup(backbone):
+    real, simulated = torch.randint(0, 4, (2, 9, 4, 16, 24)).to(torch.uint8)
+    (scores,) = score_streams(backbone, real, [simulated], readings("hidden"))
+    maps, _ = backbone.taps(torch.stack([real, simulated], dim=1).float(), None)
+    by_stage = []
+    for stage in maps["hidden"]:
+        pooled = pool_patches(stage)
+        cosine = patch_cosine(pooled[:, 0], pooled[:, 1])
+        by_stage.append(cosine[2:].mean().item())
+    score = scores["hidden_raw"]
+    assert (score.warmup, score.n_windows, len(score.curve)) == (2, 7, 9)
+    assert score.by_stage == pytest.approx(by_stage, abs=1e-6)
+    assert score.score == pytest.approx(np.mean(by_stage), abs=1e-6)
+    assert score.curve[2:].mean() == pytest.approx(score.score, abs=1e-12)
+    assert score.distance == pytest.approx(1 - score.score)
+
+
+def test_state_is_carried_and_starts_at_zero(backbone):
+    real, simulated = torch.randint(0, 4, (2, 8, 4, 16, 24)).to(torch.uint8)
+    ways = [Reading(definition=replace(BASE, warmup_windows=0))]
+    (both,) = score_streams(backbone, real, [simulated], ways)
+    (head,) = score_streams(backbone, real[:3], [simulated[:3]], ways)
+    (tail,) = score_streams(backbone, real[3:], [simulated[3:]], ways)
+    np.testing.assert_allclose(both["hidden_raw"].curve[:3], head["hidden_raw"].curve, atol=1e-6)
+    assert np.abs(both["hidden_raw"].curve[3:5] - tail["hidden_raw"].curve[:2]).min() > 1e-4
+
+
+def test_map_points_at_the_damage(backbone, make_events):
+    real = make_events(1, height=48, width=48, count=30_000)
+    broken = (real.x >= 24) & (real.y < 24)
+    kept = ~broken
+    damaged = Events(*(getattr(real, name)[kept] for name in "txyp"), height=48, width=48)
+    (scores,) = score_streams(backbone, real, [damaged], readings("downsample"))
+    image = scores["downsample_raw"].map
+    assert scores["downsample_raw"].patch_px == 6
+    assert image.shape == (8, 8)
+    assert image[:4, 4:].max() < image[4:].min()
+    np.testing.assert_allclose(image[4:], 1, atol=1e-6)
+
+
+def test_padding_of_the_backbone_is_cut_off(backbone, make_events):
+    class Padded:
+        """Garbage where the image is padded."""
+
+        strides = backbone.strides
+
+        def taps(self, x, states, stages, names):
+            maps, states = backbone.taps(x, states, stages=stages, names=names)
+            grown = {
+                name: [torch.nn.functional.pad(m, (0, 5, 0, 4), value=9.0) for m in by_stage]
+                for name, by_stage in maps.items()
+            }
+            return grown, states
+
+    a, b = make_events(1, height=16, width=24), make_events(2, height=16, width=24)
+    (plain,) = score_streams(backbone, a, [b], readings("hidden"))
+    (padded,) = score_streams(Padded(), a, [b], readings("hidden"))
+    assert padded["hidden_raw"].score == plain["hidden_raw"].score
+
+
+def test_scoring_leaves_no_trace_on_the_backbone(backbone, make_events):
+    backbone.train()
+    score_streams(backbone, make_events(1), [make_events(2)], readings("hidden"))
+    assert backbone.training
+    assert all(p.requires_grad and p.grad is None for p in backbone.parameters())
+
+
+def test_one_reference_pass_serves_all(backbone, make_events):
+    candidates = [make_events(seed) for seed in range(2, 6)]
+    score_streams(backbone, make_events(1), candidates, readings(*TAPS), chunk_windows=100)
+    assert backbone.calls == 1
+
+
+def test_metric_averages_sequences_with_equal_weight(backbone, make_events):
+    metric = EventQualityScore(backbone=backbone, bins=2)
+    scores = []
+    for seed, stop_us in ((1, 400_000), (3, 900_000)):
+        metric.update(make_events(seed, stop_us=stop_us), make_events(seed + 1, stop_us=stop_us))
+        scores.append(metric.last.score)
+    assert float(metric.compute()) == pytest.approx(np.mean(scores), abs=1e-12)
+    metric.reset()
+    assert metric.last is None
+    assert metric.higher_is_better
+    assert not metric.is_differentiable
+
+
+def test_metric_takes_histograms_and_events_alike(backbone, make_events):
+    from eqs.metrics import group_chunks
+
+    a, b = make_events(1), make_events(2)
+    chunks, _ = group_chunks([b, a], BASE, start_us=0, stop_us=1_000_000)
+    histograms = torch.cat(list(chunks))
+    metric = EventQualityScore(backbone=backbone, bins=2)
+    metric.update(a, b, 0, 1_000_000)
+    metric.update(histograms[:, 1], histograms[:, 0])
+    assert float(metric.compute()) == pytest.approx(metric.last.score, abs=1e-9)
+
+
+def test_forward_gives_the_sequence_and_keeps_the_mean(backbone, make_events):
+    metric = EventQualityScore(backbone=backbone, bins=2)
+    first = float(metric(make_events(1), make_events(2)))
+    second = float(metric(make_events(3), make_events(3)))
+    assert second == pytest.approx(1, abs=1e-6)
+    assert float(metric.compute()) == pytest.approx((first + second) / 2, abs=1e-9)
+
+
+def test_silence_has_a_documented_score(backbone, make_events):
+    metric = EventQualityScore(backbone=backbone, bins=2)
+    empty = Events.empty(20, 28)
+    metric.update(empty, make_events(1))
+    assert -1 <= metric.last.score < 0.99
+    metric.update(empty, empty, 0, 200_000)
+    assert metric.last.score == pytest.approx(1, abs=1e-6)
+
+
+def test_refusals_of_the_metric(backbone, make_events, tmp_path):
+    metric = EventQualityScore(backbone=backbone, bins=2)
+    with pytest.raises(ValueError, match="one sensor size, got 28x20 and 30x20"):
+        metric.update(make_events(1, width=30), make_events(2))
+    with pytest.raises(ValueError, match="overlap in time"):
+        metric.update(make_events(1), make_events(2).shifted(5_000_000))
+    with pytest.raises(ValueError, match=r"weights or a backbone, got neither; set metric.weights"):
+        EventQualityScore()
+    with pytest.raises(ValueError, match=r"weights or a backbone, got both"):
+        EventQualityScore("random", backbone=backbone)
+    with pytest.raises(ValueError, match="Expected a centre for a definition with centred=True"):
+        EventQualityScore(backbone=backbone, centred=True)
+    with pytest.raises(FileNotFoundError, match=r"gone.npz, got no file; set metric.centre"):
+        EventQualityScore(backbone=backbone, centre=tmp_path / "gone.npz")
+    with pytest.raises(ValueError, match=r"each of the stages \(1, 2, 3\), got 1"):
+        EventQualityScore(backbone=backbone, centre=[torch.zeros(6)])
+    with pytest.raises(ValueError, match=r"stages up to 3, got \(1, 4\)"):
+        EventQualityScore(backbone=backbone, bins=2, stages=(1, 4)).update(
+            make_events(1), make_events(1)
+        )
+
+
+@pytest.mark.filterwarnings("ignore:The ``compute`` method:UserWarning")
+def test_compute_needs_an_update(backbone):
+    with pytest.raises(ValueError, match="at least one update"):
+        EventQualityScore(backbone=backbone).compute()
+
+
+def test_broken_weights_are_never_a_silent_nan(backbone, make_events):
+    with torch.no_grad():
+        backbone.convolutions[1].weight[0] = torch.nan
+    with pytest.raises(
+        ValueError, match=r"finite features, got NaN or infinity; set metric.weights"
+    ):
+        score_streams(backbone, make_events(1), [make_events(2)], readings("hidden"))
+    with pytest.raises(ValueError, match="finite features"):
+        feature_centres(backbone, [make_events(1)], taps=["hidden"], definition=BASE)
+
+
+def test_readings_must_share_a_pass(backbone, make_events):
+    ways = [*readings("gate"), Reading(definition=replace(BASE, patch_size=2))]
+    with pytest.raises(ValueError, match="differ in tap or centring"):
+        score_streams(backbone, make_events(1), [make_events(2)], ways)
+
+
+def test_centre_belongs_to_its_tap(centres):
+    with pytest.raises(ValueError, match="centre of tap gate, got one of hidden"):
+        Reading(definition=replace(BASE, tap="gate", centred=True), centre=centres["hidden"])
+
+
+def test_centre_is_the_mean_pooled_feature_after_warmup(backbone):
+    recordings = [torch.randint(0, 4, (n, 4, 16, 24)).to(torch.uint8) for n in (8, 3)]
+    centre = feature_centres(
+        backbone, recordings, taps=["hidden"], definition=BASE, chunk_windows=1
+    )["hidden"]
+    for stage in range(3):
+        kept = [
+            pool_patches(backbone.taps(recording[:, None].float(), None)[0]["hidden"][stage])[skip:]
+            for recording, skip in zip(recordings, (2, 0), strict=True)
+        ]
+        vectors = torch.cat([part.movedim(2, -1).flatten(0, -2) for part in kept])
+        np.testing.assert_allclose(centre.means[stage], vectors.mean(0).detach(), atol=1e-6)
+
+
+def test_centre_survives_a_file(centres, tmp_path):
+    centres["gate"].save(tmp_path / "judge" / "gate.npz")
+    loaded = Centre.load(tmp_path / "judge" / "gate.npz")
+    assert loaded.sha256 == centres["gate"].sha256 != centres["hidden"].sha256
+    assert loaded.patches == centres["gate"].patches > 0
+    assert [path.name for path in (tmp_path / "judge").iterdir()] == ["gate.npz"]
+
+
+def test_damaged_centres_are_refused(centres, tmp_path):
+    path = tmp_path / "centre.npz"
+    centres["gate"].save(path)
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(ValueError, match="Expected a centre written by this package"):
+        Centre.load(path)
+    np.savez(path, tap="gate", patches=1, sha256="0", stage_1=np.zeros(3, np.float32))
+    with pytest.raises(ValueError, match="to match its hash"):
+        Centre.load(path)
+
+
+def test_centre_of_fewer_stages_is_refused(backbone, make_events, centres):
+    whole = centres["hidden"]
+    short = Centre(tap="hidden", stages=(1,), means=whole.means[:1])
+    with pytest.raises(ValueError, match=r"centre of stages \(1, 2, 3\), got one of \(1,\)"):
+        EventQualityScore(backbone=backbone, bins=2, centre=short).update(
+            make_events(1), make_events(1)
+        )
+
+
+def test_centres_need_a_recording(backbone):
+    with pytest.raises(ValueError, match="at least one real recording"):
+        feature_centres(backbone, [], taps=["hidden"], definition=BASE)

@@ -1,0 +1,144 @@
+"""The Event Quality Score with the real backbone, tiny and with random weights."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from eqs.events import Events
+from eqs.metrics import (
+    Definition,
+    EventQualityScore,
+    Reading,
+    anchors,
+    feature_centres,
+    load_backbone,
+    score_streams,
+)
+from eqs.metrics.definition import TAPS
+from eqs.models import RVTDetector
+
+BASE = Definition(architecture="rvt-tiny-split1")
+SETTINGS = {"size": "tiny", "partition_split_32": 1}
+HEIGHT, WIDTH = 40, 56  # neither a multiple of 32
+
+
+def moving_edges(seed, duration_us=400_000, count=30_000):
+    """Edges that cross the sensor: structure in space and time, unlike Poisson noise."""
+    generator = np.random.default_rng(seed)
+    t = np.sort(generator.integers(0, duration_us, count))
+    edge = generator.integers(0, 5, count)
+    start, speed = generator.uniform(0, WIDTH, 5), generator.uniform(30, 120, 5)
+    x = (start[edge] + speed[edge] * t * 1e-6 + generator.normal(0, 0.5, count)) % WIDTH
+    y = generator.integers(0, HEIGHT, count)
+    polarity = generator.random(count) < np.where(edge % 2, 0.9, 0.1)
+    return Events.from_arrays(
+        t=t, x=x.astype(int) % WIDTH, y=y, p=polarity.astype(int), height=HEIGHT, width=WIDTH
+    )
+
+
+@pytest.fixture(scope="module")
+def judge():
+    return load_backbone("random", **SETTINGS)[0]
+
+
+@pytest.fixture(scope="module")
+def readings(judge):
+    centres = feature_centres(judge, [moving_edges(8), moving_edges(9)], taps=TAPS, definition=BASE)
+    raw = [Reading(definition=replace(BASE, tap=tap)) for tap in TAPS]
+    return raw + [
+        Reading(definition=replace(BASE, tap=tap, centred=True), centre=centre)
+        for tap, centre in centres.items()
+    ]
+
+
+@pytest.fixture(scope="module")
+def scores(judge, readings):
+    real = moving_edges(1)
+    table = anchors(real, other=moving_edges(2), frame_times_us=range(0, 400_001, 50_000))
+    results = score_streams(
+        judge, real, list(table.values()), readings, start_us=0, stop_us=400_000
+    )
+    return dict(zip(table, results, strict=True))
+
+
+def test_identity_for_every_tap(scores):
+    assert len(scores["identical"]) == 2 * len(TAPS)
+    for name, score in scores["identical"].items():
+        assert score.score == pytest.approx(1, abs=1e-6), name
+
+
+def test_no_damage_scores_above_identity(scores):
+    for anchor, by_reading in scores.items():
+        if anchor != "identical":
+            assert all(score.score < 1 - 1e-4 for score in by_reading.values()), anchor
+
+
+def test_more_thinning_scores_lower(scores):
+    for name in ("hidden_raw", "hidden_centred", "downsample_raw", "downsample_centred"):
+        order = [scores[key][name].score for key in ("identical", "ceiling", "thinned_50", "blank")]
+        assert order == sorted(order, reverse=True), name
+
+
+def test_map_covers_the_image(scores):
+    score = scores["chance"]["hidden_raw"]
+    assert score.patch_px == 12
+    assert score.map.shape == (4, 5)
+    assert len(score.by_stage) == 3
+
+
+def test_chunks_do_not_matter(judge, readings):
+    a, b = moving_edges(1), moving_edges(2)
+    one, other = (
+        score_streams(judge, a, [b], readings, chunk_windows=length)[0] for length in (2, 100)
+    )
+    for name, score in one.items():
+        assert score.score == pytest.approx(other[name].score, abs=1e-5), name
+
+
+def test_symmetry(judge, readings):
+    a, b = moving_edges(1), moving_edges(2)
+    limits = {"start_us": 0, "stop_us": 400_000}
+    (there,) = score_streams(judge, a, [b], readings, **limits)
+    (back,) = score_streams(judge, b, [a], readings, **limits)
+    for name, score in there.items():
+        assert score.score == pytest.approx(back[name].score, abs=1e-5), name
+
+
+def test_autocast_outside_does_not_reach_the_score(judge, readings):
+    a, b = moving_edges(1), moving_edges(2)
+    (plain,) = score_streams(judge, a, [b], readings[:3])
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        (cast,) = score_streams(judge, a, [b], readings[:3])
+    assert all(cast[name].score == plain[name].score for name in plain)
+
+
+def test_metric_from_a_checkpoint(tmp_path):
+    torch.manual_seed(3)
+    model = RVTDetector(num_classes=3, **SETTINGS)
+    torch.save({"state_dict": model.state_dict()}, tmp_path / "judge.ckpt")
+    metric = EventQualityScore(tmp_path / "judge.ckpt", **SETTINGS)
+    direct = EventQualityScore(backbone=model.backbone)
+    for each in (metric, direct):
+        each.update(moving_edges(1), moving_edges(2))
+    assert float(metric.compute()) == pytest.approx(float(direct.compute()), abs=1e-7)
+    assert len(metric.weights_sha256) == 64
+    with pytest.raises(ValueError, match=r"size small, got tiny; set metric\.size"):
+        EventQualityScore(tmp_path / "judge.ckpt", partition_split_32=1)
+    with pytest.raises(ValueError, match=r"input channels 10, got 20; set metric\.bins"):
+        EventQualityScore(tmp_path / "judge.ckpt", bins=5, **SETTINGS)
+
+
+def test_random_weights_are_seeded_and_leave_the_global_seed_alone():
+    torch.manual_seed(5)
+    expected = torch.rand(1)
+    torch.manual_seed(5)
+    digests = [load_backbone("random", seed=seed, **SETTINGS)[1] for seed in (0, 0, 1)]
+    assert torch.rand(1) == expected
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_missing_checkpoint_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"gone\.ckpt, got no file; set metric\.weights"):
+        EventQualityScore(tmp_path / "gone.ckpt")

@@ -1,0 +1,91 @@
+"""Streams cut into common windows."""
+
+import numpy as np
+import pytest
+import torch
+
+from eqs.events import Events
+from eqs.metrics import Definition, group_chunks, window_starts
+from eqs.metrics.windows import chunk_length
+from eqs.representations import stacked_histogram
+
+
+def at(*times):
+    zeros = [0] * len(times)
+    return Events.from_arrays(t=times, x=zeros, y=zeros, p=zeros, height=4, width=6)
+
+
+def test_windows_cover_the_overlap_and_drop_the_remainder():
+    starts = window_starts([at(5, 100), at(20, 74, 90)], 10)
+    assert starts.tolist() == [20, 30, 40, 50, 60, 70, 80]
+
+
+def test_last_event_belongs_to_the_overlap():
+    assert window_starts([at(0, 19)], 10).tolist() == [0, 10]
+    assert window_starts([at(0, 18)], 10).tolist() == [0]
+
+
+def test_explicit_limits_win():
+    assert window_starts([at(5, 100)], 10, -20, 5).tolist() == [-20, -10]
+
+
+def test_a_stream_without_events_sets_no_limit():
+    assert window_starts([at(), at(0, 29)], 10).tolist() == [0, 10, 20]
+    assert window_starts([at(), at()], 10, 0, 10).tolist() == [0]
+
+
+def test_refusals():
+    with pytest.raises(ValueError, match="overlap in time, got a common stretch from 50 us to 11"):
+        window_starts([at(0, 10), at(50, 90)], 10)
+    with pytest.raises(ValueError, match="one window of 1000 us, got an overlap of 11 us"):
+        window_starts([at(0, 10)], 1000)
+    with pytest.raises(ValueError, match="got none; give start_us and stop_us"):
+        window_starts([at(), at()], 10)
+
+
+def test_chunks_are_the_windows_histograms(make_events):
+    streams = [make_events(1), make_events(2)]
+    definition = Definition(bins=2)
+    chunks, count = group_chunks(
+        streams, definition, start_us=100_000, stop_us=460_000, chunk_windows=3
+    )
+    chunks = list(chunks)
+    assert count == 7
+    assert [tuple(chunk.shape) for chunk in chunks] == [
+        (3, 2, 4, 20, 28),
+        (3, 2, 4, 20, 28),
+        (1, 2, 4, 20, 28),
+    ]
+    expected = stacked_histogram(streams[1], bins=2, start_us=250_000, stop_us=300_000)
+    np.testing.assert_array_equal(chunks[1][0, 1].numpy(), expected)
+    assert chunks[0].dtype == torch.uint8
+
+
+def test_histograms_pass_through():
+    tensors = [torch.randint(0, 9, (5, 4, 6, 8), dtype=torch.uint8) for _ in range(3)]
+    chunks, count = group_chunks(tensors, Definition(bins=2), chunk_windows=2)
+    joined = torch.cat(list(chunks))
+    assert count == 5
+    assert torch.equal(joined, torch.stack(tensors, dim=1))
+
+
+@pytest.mark.parametrize(
+    ("streams", "message"),
+    [
+        ([torch.zeros(2, 4, 3, 3), torch.zeros(1, 4, 3, 3)], "histograms of one shape"),
+        ([torch.zeros(2, 6, 3, 3)], r"shape \(windows, 4, height, width\).*set metric.bins"),
+        ([torch.zeros(0, 4, 3, 3)], "at least one window"),
+        ([torch.full((2, 4, 3, 3), torch.nan)], "finite histograms, got NaN"),
+        ([torch.zeros(2, 4, 3, 3), at(1, 2)], "got both; convert one of them"),
+        ([at(1, 2), Events.empty(9, 9)], "one sensor size, got 6x4 and 9x9"),
+    ],
+)
+def test_streams_that_do_not_fit_are_refused(streams, message):
+    with pytest.raises(ValueError, match=message):
+        group_chunks(streams, Definition(bins=2))
+
+
+def test_chunks_shrink_as_frames_grow():
+    assert chunk_length(2, 480, 640) == 4
+    assert chunk_length(2, 96, 128) == 32
+    assert chunk_length(99, 720, 1280) == 1
