@@ -70,6 +70,7 @@ class FrameFolder:
     def __init__(
         self, folder: Path | str, timestamps_us: NDArray[np.int64], chunk: int = 8
     ) -> None:
+        """List the images and check that the times fit them."""
         if chunk < 1:
             raise ValueError(f"Expected at least one frame per chunk, got {chunk}; set chunk=8")
         self.paths = image_paths(folder)

@@ -20,8 +20,8 @@ MODES = ("fixed", "faithful")
 class Interval(NamedTuple):
     """The time between two frames, on a clock that starts at the first frame."""
 
-    index: int
-    """Number of the later frame."""
+    frame: int
+    """Number of the later frame, from 0."""
     start_us: int
     stop_us: int
 
@@ -122,6 +122,7 @@ class Stream:
     """
 
     def __init__(self, simulator: Simulator, sequence: str) -> None:
+        """See `Simulator.start`."""
         self.simulator = simulator
         self.sequence = sequence
         self._pixels: Pixels | None = None

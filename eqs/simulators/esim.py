@@ -20,10 +20,9 @@ from eqs.simulators.crossing import (
     levels_passed,
     officially_crossed,
 )
-from eqs.simulators.ordering import event_key, with_room
-from eqs.simulators.randomness import draw_key, normal, normal_map, word_at
-
-SMALLEST_THRESHOLD_LOG = 0.01
+from eqs.simulators.ordering import Fired, event_key, with_room
+from eqs.simulators.randomness import draw_key, normal, word_at
+from eqs.simulators.thresholds import SMALLEST_THRESHOLD_LOG, threshold_map
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +75,7 @@ class ESIM(Simulator):
         """Only the thresholds are random."""
         return self.threshold_sigma_log > 0
 
-    def log_intensity(self, levels: NDArray[np.float64]) -> NDArray[np.floating]:
+    def log_intensity(self, levels: NDArray[np.float64]) -> NDArray[Any]:
         """The signal at grey levels 0..255; rounded to float32 in `faithful` mode."""
         signal = np.log(self.log_offset + levels / 255.0)
         if self.mode == "faithful":
@@ -89,23 +88,11 @@ class ESIM(Simulator):
         return kind(self, image, sequence)
 
 
-def threshold_map(
-    mean_log: float, sigma_log: float, seed: int, name: str, pixels: int
-) -> NDArray[np.float64]:
-    """A threshold for every pixel, normally distributed and at least 0.01.
-
-    Without spread the map takes no memory: it is one number seen `pixels` times.
-    """
-    if sigma_log == 0:
-        return np.broadcast_to(np.float64(mean_log), (pixels,))
-    drawn = mean_log + sigma_log * normal_map(draw_key(seed, name), pixels)
-    return np.maximum(drawn, SMALLEST_THRESHOLD_LOG)
-
-
 class ESIMPixels:
     """References and last events of all pixels, robust rule, static thresholds."""
 
     def __init__(self, model: ESIM, image: GreyImage, sequence: str) -> None:
+        """Settle on the first image."""
         self.model = model
         self.sequence = sequence
         pixels = image.codes.size
@@ -125,9 +112,7 @@ class ESIMPixels:
         self.codes, self.signal = image.codes, signal
         return self.keys[:count]
 
-    def _fire(
-        self, codes: NDArray[Any], signal: NDArray[np.float64], interval: Interval
-    ) -> tuple[NDArray[np.int64], int]:
+    def _fire(self, codes: NDArray[Any], signal: NDArray[Any], interval: Interval) -> Fired:
         return _fire_robust(
             self.codes,
             self.signal,
@@ -147,9 +132,7 @@ class ESIMPixels:
 class FaithfulESIMPixels(ESIMPixels):
     """The published program's pixels: official rule, thresholds drawn anew for every frame."""
 
-    def _fire(
-        self, codes: NDArray[Any], signal: NDArray[np.float64], interval: Interval
-    ) -> tuple[NDArray[np.int64], int]:
+    def _fire(self, codes: NDArray[Any], signal: NDArray[Any], interval: Interval) -> Fired:
         model = self.model
         return _fire_official(
             self.codes,
@@ -159,9 +142,9 @@ class FaithfulESIMPixels(ESIMPixels):
             self.reference,
             self.last_us,
             (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
-            draw_key(model.seed, "threshold jitter", self.sequence, str(interval.index)),
+            draw_key(model.seed, "threshold jitter", self.sequence, str(interval.frame)),
             float(model.refractory_us),
-            interval.index == 1,
+            interval.frame == 1,
             interval.start_us,
             interval.span_us,
             self.keys,
@@ -169,11 +152,11 @@ class FaithfulESIMPixels(ESIMPixels):
 
 
 @njit(cache=True, nogil=True)
-def _fire_robust(  # noqa: ANN202
+def _fire_robust(
     old_codes: NDArray[Any],
-    old_signal: NDArray[np.float64],
+    old_signal: NDArray[Any],
     codes: NDArray[Any],
-    signal: NDArray[np.float64],
+    signal: NDArray[Any],
     reference: NDArray[np.float64],
     last_us: NDArray[np.float64],
     on: NDArray[np.float64],
@@ -182,7 +165,7 @@ def _fire_robust(  # noqa: ANN202
     start_us: int,
     span_us: int,
     keys: NDArray[np.int64],
-):
+) -> Fired:
     count = 0
     for pixel in range(codes.size):
         last = signal[codes[pixel]]
@@ -206,11 +189,11 @@ def _fire_robust(  # noqa: ANN202
 
 
 @njit(cache=True, nogil=True)
-def _fire_official(  # noqa: ANN202
+def _fire_official(
     old_codes: NDArray[Any],
-    old_signal: NDArray[np.float64],
+    old_signal: NDArray[Any],
     codes: NDArray[Any],
-    signal: NDArray[np.float64],
+    signal: NDArray[Any],
     reference: NDArray[np.float64],
     last_us: NDArray[np.float64],
     thresholds: tuple[float, float, float],
@@ -220,7 +203,7 @@ def _fire_official(  # noqa: ANN202
     start_us: int,
     span_us: int,
     keys: NDArray[np.int64],
-):
+) -> Fired:
     on, off, sigma = thresholds
     count = 0
     for pixel in range(codes.size):
@@ -233,7 +216,7 @@ def _fire_official(  # noqa: ANN202
             threshold += sigma * normal(word_at(frame_key, pixel))
             threshold = max(threshold, SMALLEST_THRESHOLD_LOG)
         step = np.float32(sign * threshold)
-        level = np.float32(reference[pixel] + step)
+        level: Any = np.float32(reference[pixel] + step)
         while officially_crossed(level, first, last, sign):
             keys = with_room(keys, count + 1)
             offset_us = crossing_share(level, first, last) * span_us

@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from eqs.events import Events
 
+Fired = tuple[NDArray[np.int64], int]
+"""A buffer of event keys, and how many of them count."""
+
 PIXEL_BITS = 26  # 67 million pixels
 TIME_SHIFT = PIXEL_BITS + 1
 MAX_PIXELS = 1 << PIXEL_BITS
@@ -87,6 +90,7 @@ class ReorderBuffer:
     """Holds events back until nothing earlier can follow."""
 
     def __init__(self) -> None:
+        """Start with nothing waiting."""
         self.waiting = np.empty(0, np.int64)
 
     def push(self, keys: NDArray[np.int64], watermark_us: int) -> NDArray[np.int64]:

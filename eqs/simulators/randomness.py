@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from statistics import NormalDist
 
 import numpy as np
 from numba import njit
@@ -19,13 +20,25 @@ _FIRST = np.uint64(0xBF58476D1CE4E5B9)
 _SECOND = np.uint64(0x94D049BB133111EB)
 _LOW = np.uint64(0xFFFFFFFF)
 _S30, _S27, _S31, _S32, _S11 = (np.uint64(shift) for shift in (30, 27, 31, 32, 11))
+_QUANTILE_MASK = np.uint64(2047)
+_LARGEST_POISSON = 10_000
+
+
+def _normal_quantiles(count: int) -> NDArray[np.float64]:
+    """The middle quantiles of `count` equal parts of a normal distribution, of unit variance."""
+    middles = (np.arange(count) + 0.5) / count
+    values = np.array([NormalDist().inv_cdf(middle) for middle in middles])
+    return values / values.std()
+
+
+NORMAL_QUANTILES = _normal_quantiles(2048)
 
 
 def draw_key(seed: int, *names: str) -> np.uint64:
     """The key of one family of draws, from the seed and what the draws are for.
 
     Example:
-        >>> len({draw_key(0, "leak"), draw_key(1, "leak"), draw_key(0, "shot"), draw_key(0, "leak")})
+        >>> len({draw_key(0, "leak"), draw_key(1, "leak"), draw_key(0, "shot")})
         3
     """
     text = "\0".join((str(int(seed)), *names))
@@ -59,6 +72,27 @@ def normal(word: np.uint64) -> float:
     radius = (np.float64(word >> _S32) + 0.5) * 2.0**-32
     angle = np.float64(word & _LOW) * 2.0**-32
     return math.sqrt(-2.0 * math.log(radius)) * math.cos(2.0 * math.pi * angle)
+
+
+@njit(cache=True)
+def normal_quantile(word: np.uint64, quantiles: NDArray[np.float64]) -> float:
+    """A roughly normal number, one of `NORMAL_QUANTILES`, from the 11 bits `uniform` leaves."""
+    return quantiles[word & _QUANTILE_MASK]
+
+
+@njit(cache=True)
+def poisson(word: np.uint64, expected: float) -> int:
+    """A Poisson number from 64 random bits, by inversion of the distribution."""
+    target = uniform(word)
+    if target <= 1.0 - expected:  # exp(-x) >= 1 - x spares the exponential nearly always
+        return 0
+    number, probability = 0, math.exp(-expected)
+    cumulated = probability
+    while target >= cumulated and number < _LARGEST_POISSON:
+        number += 1
+        probability *= expected / number
+        cumulated += probability
+    return number
 
 
 @njit(cache=True)

@@ -1,0 +1,214 @@
+"""PIX2NVS: thresholded log-luma differences with per-pixel adaptive thresholds.
+
+Bi and Andreopoulos, "PIX2NVS: Parameterized Conversion of Pixel-Domain Video Frames to Neuromorphic
+Vision Streams", ICIP 2017.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from eqs.frames import GreyImage
+from eqs.simulators.base import Interval, Simulator, require_positive
+from eqs.simulators.ordering import Fired, event_key, with_room
+
+REFERENCE_UPDATES = ("previous", "replace", "integrate", "never")
+BLOCKS = (1, 2, 4)
+_PREVIOUS, _REPLACE, _INTEGRATE, _NEVER = range(4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PIX2NVS(Simulator):
+    """Compares each frame's log luma with a reference and spreads the events over the interval.
+
+    The pixel of each block that differs most fires `min(max_events, |d| / threshold)` events at
+    shares `i threshold / |d|` of the interval, which are the crossings of a line from the
+    reference. A pixel's threshold grows by the share `adaptation` at each frame in which it fires
+    and shrinks by it in the others. There is no randomness. Black counts as grey level 1, whose
+    logarithm exists.
+
+    In `fixed` mode events lie within the interval in which the change happened, and adaptation
+    keeps thresholds between `threshold_min_log` and `threshold_max_log`, the range the program
+    allows for its own parameter. In `faithful` mode events come one frame later, and thresholds
+    adapt without bounds, so that every pixel fires in 51 % of the frames whatever it sees.
+
+    Args:
+        threshold_log: contrast of an event at the start, natural-log units.
+        threshold_min_log: least threshold in `fixed` mode.
+        threshold_max_log: greatest threshold in `fixed` mode.
+        adaptation: share by which thresholds change each frame, 0 for constant ones.
+        reference_update: what the reference becomes: the `previous` frame; at pixels that fired
+            the current value (`replace`) or the last level fired (`integrate`, from a reference of
+            zero, so that a clip begins with a burst of ON events); or `never` anything but the
+            first frame.
+        max_events: most events of a pixel in one interval; contrast beyond is lost, except with
+            `integrate`.
+        block: side of the blocks in which a single pixel may fire, 1, 2 or 4.
+
+    Raises:
+        ValueError: a parameter lies outside its range.
+
+    Example:
+        >>> frames = np.array([np.full((1, 1), level) for level in (64.0, 128.0)])
+        >>> PIX2NVS(threshold_log=0.2).simulate(frames, [0, 70_000]).t.tolist()
+        [20197, 40395, 60593]
+    """
+
+    name: ClassVar[str] = "pix2nvs"
+    rounds_luma: ClassVar[bool] = False
+
+    threshold_log: float = 0.4
+    threshold_min_log: float = 0.2
+    threshold_max_log: float = 0.7
+    adaptation: float = 0.05
+    reference_update: str = "previous"
+    max_events: int = 5
+    block: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the parameters."""
+        super().__post_init__()
+        require_positive(self, "threshold_log", "threshold_min_log", "threshold_max_log")
+        inside = self.threshold_min_log <= self.threshold_log <= self.threshold_max_log
+        if self.mode == "fixed" and not inside:
+            raise ValueError(
+                f"Expected threshold_log from {self.threshold_min_log} to "
+                f"{self.threshold_max_log}, got {self.threshold_log}; set sim.threshold_log, "
+                "sim.threshold_min_log or sim.threshold_max_log"
+            )
+        if not 0 <= self.adaptation < 1:
+            raise ValueError(
+                f"Expected adaptation of at least 0 and below 1, got {self.adaptation}; "
+                "set sim.adaptation"
+            )
+        if self.reference_update not in REFERENCE_UPDATES:
+            raise ValueError(
+                f"Expected reference_update to be one of {', '.join(REFERENCE_UPDATES)}, got "
+                f"{self.reference_update!r}; set sim.reference_update"
+            )
+        if self.max_events < 1:
+            raise ValueError(f"Expected max_events of 1 or more, got {self.max_events}")
+        if self.block not in BLOCKS:
+            raise ValueError(f"Expected block 1, 2 or 4, got {self.block}; set sim.block")
+
+    def begin(self, image: GreyImage, sequence: str) -> PIX2NVSPixels:
+        """The pixels after the first frame."""
+        return PIX2NVSPixels(self, image)
+
+
+def log_luma(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Natural log of the grey level, black counted as level 1.
+
+    Example:
+        >>> log_luma(np.array([0.0, 1.0, 255.0])).round(3).tolist()
+        [0.0, 0.0, 5.541]
+    """
+    return np.log(np.maximum(levels, 1.0))
+
+
+class PIX2NVSPixels:
+    """References and thresholds of all pixels."""
+
+    def __init__(self, model: PIX2NVS, image: GreyImage) -> None:
+        """Settle on the first image."""
+        self.model = model
+        self.update = REFERENCE_UPDATES.index(model.reference_update)
+        first = log_luma(image.levels)[image.codes]
+        self.reference = np.zeros_like(first) if self.update == _INTEGRATE else first
+        self.threshold = np.full(first.size, float(model.threshold_log))
+        self.keys = np.empty(first.size, np.int64)
+
+    def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
+        """Events of one interval."""
+        model = self.model
+        fixed = model.mode == "fixed"
+        bounds = (model.threshold_min_log, model.threshold_max_log) if fixed else (0.0, math.inf)
+        self.keys, count = _fire_blocks(
+            image.codes,
+            log_luma(image.levels),
+            self.reference,
+            self.threshold,
+            bounds,
+            float(model.adaptation),
+            self.update,
+            model.max_events,
+            (image.height, image.width, model.block),
+            # The program stamps one interval late, and rounds where we floor.
+            interval.start_us if fixed else interval.stop_us,
+            0.0 if fixed else 0.5,
+            interval.span_us,
+            self.keys,
+        )
+        return self.keys[:count]
+
+
+@njit(cache=True)
+def _strongest(
+    codes: NDArray[Any],
+    signal: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    rows: tuple[int, int],
+    columns: tuple[int, int],
+    width: int,
+) -> int:
+    """The pixel of a block whose signal differs most from its reference."""
+    winner, largest = rows[0] * width + columns[0], -1.0
+    for y in range(rows[0], rows[1]):
+        for x in range(columns[0], columns[1]):
+            pixel = y * width + x
+            distance = abs(signal[codes[pixel]] - reference[pixel])
+            if distance > largest:
+                winner, largest = pixel, distance
+    return winner
+
+
+@njit(cache=True, nogil=True)
+def _fire_blocks(
+    codes: NDArray[Any],
+    signal: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    threshold: NDArray[np.float64],
+    bounds: tuple[float, float],
+    adaptation: float,
+    update: int,
+    max_events: int,
+    shape: tuple[int, int, int],
+    base_us: int,
+    rounding: float,
+    span_us: int,
+    keys: NDArray[np.int64],
+) -> Fired:
+    height, width, block = shape
+    count = 0
+    for top in range(0, height, block):
+        rows = (top, min(top + block, height))
+        for left in range(0, width, block):
+            columns = (left, min(left + block, width))
+            pixel = _strongest(codes, signal, reference, rows, columns, width)
+            limit = threshold[pixel]
+            difference = signal[codes[pixel]] - reference[pixel]
+            distance = abs(difference)
+            if distance <= limit:
+                threshold[pixel] = max(limit * (1.0 - adaptation), bounds[0])
+                continue
+            number = int(min(distance / limit, float(max_events)))
+            keys = with_room(keys, count + number)
+            for ordinal in range(1, number + 1):
+                offset_us = int(ordinal * limit / distance * span_us + rounding)
+                keys[count] = event_key(base_us + offset_us, pixel, 1 if difference > 0 else 0)
+                count += 1
+            if update == _REPLACE:
+                reference[pixel] = signal[codes[pixel]]
+            elif update == _INTEGRATE:
+                reference[pixel] += number * limit if difference > 0 else -number * limit
+            threshold[pixel] = min(limit * (1.0 + adaptation), bounds[1])
+    if update == _PREVIOUS:
+        for pixel in range(codes.size):
+            reference[pixel] = signal[codes[pixel]]
+    return keys, count

@@ -1,0 +1,28 @@
+"""Thresholds that differ from pixel to pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eqs.simulators.randomness import draw_key, normal_map
+
+SMALLEST_THRESHOLD_LOG = 0.01
+
+
+def threshold_map(
+    mean_log: float, sigma_log: float, seed: int, name: str, pixels: int
+) -> NDArray[np.float64]:
+    """A threshold for every pixel, normally distributed and at least 0.01.
+
+    The map belongs to the sensor: it depends on the seed and the name alone. Without spread it
+    takes no memory, being one number seen `pixels` times.
+
+    Example:
+        >>> threshold_map(0.2, 0.0, seed=0, name="on", pixels=3).tolist()
+        [0.2, 0.2, 0.2]
+    """
+    if sigma_log == 0:
+        return np.broadcast_to(np.float64(mean_log), (pixels,))
+    drawn = mean_log + sigma_log * normal_map(draw_key(seed, name), pixels)
+    return np.maximum(drawn, SMALLEST_THRESHOLD_LOG)
