@@ -36,6 +36,8 @@ class EventReader:
         path: file in the layout of DSEC.
         height: rows of the sensor; needed where the file does not carry them.
         width: columns of the sensor; needed where the file does not carry them.
+        rows: number of rows, counted from the top, to keep; the stream then looks like that of a
+            sensor with so many rows, except that `len` counts all events. All rows if None.
 
     Raises:
         FileNotFoundError: there is no such file (at the first use).
@@ -45,10 +47,15 @@ class EventReader:
     """
 
     def __init__(
-        self, path: Path | str, height: int | None = None, width: int | None = None
+        self,
+        path: Path | str,
+        height: int | None = None,
+        width: int | None = None,
+        rows: int | None = None,
     ) -> None:
         """Remember the file; nothing is opened yet."""
         self.path = Path(path)
+        self.rows = rows
         self._size = (height, width)
         self._handles: _Handles | None = None
 
@@ -73,8 +80,9 @@ class EventReader:
 
     @property
     def height(self) -> int:
-        """Rows of the sensor."""
-        return self._opened().height
+        """Rows of the sensor that are kept."""
+        height = self._opened().height
+        return height if self.rows is None else min(self.rows, height)
 
     @property
     def width(self) -> int:
@@ -92,7 +100,7 @@ class EventReader:
         return self._opened().stop_us
 
     def __len__(self) -> int:
-        """Number of events."""
+        """Number of events in the file."""
         return self._opened().count
 
     def read(self) -> Events:
@@ -108,14 +116,15 @@ class EventReader:
         file = self._opened()
         start_us, stop_us = max(start_us, file.start_us), min(stop_us, file.stop_us)
         if start_us >= stop_us:
-            return Events.empty(file.height, file.width)
+            return Events.empty(self.height, file.width)
         try:
             first, t = file.times(start_us - file.offset_us, stop_us - file.offset_us)
             rows = slice(first, first + len(t))
             fields = {name: file.columns[name][rows].astype(FIELDS[name]) for name in "xyp"}
-            return Events(t + file.offset_us, **fields, height=file.height, width=file.width)
+            events = Events(t + file.offset_us, **fields, height=file.height, width=file.width)
         except (OSError, ValueError) as error:
             raise ValueError(f"{self.path}: {error}") from error
+        return events if self.height == file.height else _top_rows(events, self.height)
 
     def _opened(self) -> _Handles:
         if self._handles is None or self._handles.process != os.getpid():
@@ -370,6 +379,13 @@ class EventWriter:
         edges_us = np.arange(self._next_ms, stop_ms, dtype=np.int64) * 1000
         self._index.append(self._count + np.searchsorted(relative_us, edges_us, side="left"))
         self._next_ms = max(self._next_ms, stop_ms)
+
+
+def _top_rows(events: Events, rows: int) -> Events:
+    """The events above a row, on a sensor that ends there."""
+    keep = events.y < rows
+    fields = {name: getattr(events, name)[keep] for name in FIELDS}
+    return Events(**fields, height=rows, width=events.width)
 
 
 def _open_hdf5(path: Path) -> h5py.File:
