@@ -1,0 +1,226 @@
+"""One sequence in the layout of DSEC: frames, their times, events and labels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from eqs.frames import read_image
+
+EVENTS = Path("events/left/events.h5")
+FRAMES = Path("images/left/distorted")
+FRAME_TIMES = Path("images/timestamps.txt")
+EXPOSURES = Path("images/left/exposure_timestamps.txt")
+TRACKS = Path("object_detections/left/tracks.npy")
+TRACK_FIELDS = ("t", "x", "y", "w", "h", "class_id")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """What a sequence folder holds, with everything but frames and events already read.
+
+    Convention: all times are on the recording's own clock, so a label's time equals its frame's.
+    The frames are those in the distorted view, pixel for pixel that of the event sensor.
+
+    Args:
+        name: the sequence's name.
+        folder: the sequence's folder.
+        height: rows of the sensor and of the frames.
+        width: columns of the sensor and of the frames.
+        frame_times_us: middle of each frame's exposure, int64, rising, shape (frames,).
+        frame_paths: the frames' files in order; empty where the recording has no frames.
+        exposures_us: start and end of each frame's exposure, int64, shape (frames, 2), if known.
+        tracks: labelled boxes sorted by time, with at least the fields t, x, y, w, h and class_id;
+            None where the recording has no labels.
+    """
+
+    name: str
+    folder: Path
+    height: int
+    width: int
+    frame_times_us: NDArray[np.int64]
+    frame_paths: tuple[Path, ...] = ()
+    exposures_us: NDArray[np.int64] | None = None
+    tracks: NDArray[np.void] | None = None
+
+    @classmethod
+    def load(
+        cls, folder: Path | str, height: int | None = None, width: int | None = None
+    ) -> Recording:
+        """Read a sequence folder; without a given size the first frame tells the sensor's.
+
+        Raises:
+            FileNotFoundError: the folder does not exist.
+            ValueError: the folder holds neither events nor frames, frames and timestamps do not
+                fit, there is only one frame, the frames have another size than given, the size is
+                unknown, or the labels cannot be read.
+        """
+        folder = Path(folder)
+        if not folder.is_dir():
+            raise FileNotFoundError(f"Expected a recording at {folder}, found none; set data.root")
+        paths = tuple(sorted((folder / FRAMES).glob("*.png")))
+        if not paths and not (folder / EVENTS).exists():
+            raise ValueError(
+                f"Expected {EVENTS} or {FRAMES}/*.png in {folder}, found neither; "
+                "set data.root to a folder of recordings in the layout of DSEC"
+            )
+        times_us = _frame_times(folder, len(paths))
+        if paths:
+            height, width = _frame_size(paths[0], height, width)
+        if height is None or width is None:
+            raise ValueError(
+                f"Expected a sensor size for {folder}, which has no frames to tell it; "
+                "set data.size"
+            )
+        return cls(
+            name=folder.name,
+            folder=folder,
+            height=height,
+            width=width,
+            frame_times_us=times_us,
+            frame_paths=paths,
+            exposures_us=_exposures(folder, len(times_us)),
+            tracks=_tracks(folder, times_us),
+        )
+
+    @property
+    def events_path(self) -> Path:
+        """The file of the recorded events."""
+        return self.folder / EVENTS
+
+    @property
+    def frame_folder(self) -> Path:
+        """The folder of the frames."""
+        return self.folder / FRAMES
+
+    @property
+    def has_events(self) -> bool:
+        """Whether the sensor's own events are there."""
+        return self.events_path.exists()
+
+    @property
+    def has_frames(self) -> bool:
+        """Whether there are frames to simulate from."""
+        return len(self.frame_paths) > 0
+
+    @property
+    def has_labels(self) -> bool:
+        """Whether boxes were labelled (perhaps none)."""
+        return self.tracks is not None
+
+    def read_frame(self, index: int) -> NDArray[np.uint8]:
+        """One frame, uint8, (height, width) grey or (height, width, 3) RGB.
+
+        Raises:
+            ValueError: the file is no image, or one of another size.
+        """
+        path = self.frame_paths[index]
+        frame = read_image(path)
+        if frame.shape[:2] != (self.height, self.width):
+            raise ValueError(
+                f"Expected frames of {self.width}x{self.height} pixels, got "
+                f"{frame.shape[1]}x{frame.shape[0]} in {path}; set data.size or replace it"
+            )
+        return frame
+
+    def tracks_at(self, time_us: int) -> NDArray[np.void]:
+        """The label rows of one frame time; none where nothing was labelled."""
+        if self.tracks is None:
+            return np.empty(0, [(name, np.float64) for name in TRACK_FIELDS])
+        first, last = np.searchsorted(self.tracks["t"].astype(np.int64), [time_us, time_us + 1])
+        return self.tracks[first:last]
+
+
+def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
+    path = folder / FRAME_TIMES
+    if not path.exists():
+        if frames:
+            raise ValueError(
+                f"Expected {FRAME_TIMES} beside the {frames} frames of {folder}, found none; "
+                "add the time of each frame in microseconds, one a line"
+            )
+        return np.empty(0, np.int64)
+    times_us = _whole_numbers(path).reshape(-1)
+    if frames == 1 or len(times_us) == 1:
+        raise ValueError(
+            f"Expected at least two frames in {folder}, got one; a single frame moves nothing"
+        )
+    if frames and len(times_us) != frames:
+        raise ValueError(
+            f"Expected one timestamp per frame in {folder}, got {len(times_us)} lines in "
+            f"{FRAME_TIMES} and {frames} frames; complete the recording"
+        )
+    if len(times_us) and (times_us[0] < 0 or np.any(np.diff(times_us) <= 0)):
+        raise ValueError(
+            f"Expected rising times of zero or more in {path}, got others; "
+            "sort frames and timestamps"
+        )
+    return times_us
+
+
+def _whole_numbers(path: Path) -> NDArray[np.int64]:
+    """The numbers of a text file, one row per line that is not a comment."""
+    lines = [line for line in path.read_text().splitlines() if line.strip()]
+    rows = [line.split(",") for line in lines if not line.lstrip().startswith("#")]
+    try:
+        return np.array([[int(number) for number in row] for row in rows], np.int64)
+    except ValueError as error:
+        raise ValueError(
+            f"Expected whole microseconds in {path}, got: {error}; write one row a line"
+        ) from error
+
+
+def _exposures(folder: Path, frames: int) -> NDArray[np.int64] | None:
+    path = folder / EXPOSURES
+    if not path.exists():
+        return None
+    exposures_us = _whole_numbers(path)
+    if exposures_us.shape != (frames, 2):
+        raise ValueError(
+            f"Expected start and end of {frames} exposures in {path}, got numbers of shape "
+            f"{exposures_us.shape}; complete the file or remove it"
+        )
+    return exposures_us
+
+
+def _frame_size(path: Path, height: int | None, width: int | None) -> tuple[int, int]:
+    try:
+        with Image.open(path) as image:
+            found_width, found_height = image.size
+    except OSError as error:
+        raise ValueError(f"Expected an image at {path}, got: {error}; replace it") from error
+    if (height or found_height, width or found_width) != (found_height, found_width):
+        raise ValueError(
+            f"Expected frames of {width}x{height} pixels, got {found_width}x{found_height} in "
+            f"{path}; set data.size"
+        )
+    return found_height, found_width
+
+
+def _tracks(folder: Path, frame_times_us: NDArray[np.int64]) -> NDArray[np.void] | None:
+    path = folder / TRACKS
+    if not path.exists():
+        return None
+    try:
+        tracks = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise ValueError(
+            f"Expected a label array in {path}, got: {error}; replace the damaged file"
+        ) from error
+    missing = [name for name in TRACK_FIELDS if name not in (tracks.dtype.names or ())]
+    if missing:
+        raise ValueError(
+            f"Expected labels with the fields {', '.join(TRACK_FIELDS)} in {path}, got none named "
+            f"{', '.join(missing)}; replace the file"
+        )
+    tracks = tracks[np.argsort(tracks["t"], kind="stable")]
+    if len(tracks) and not np.isin(tracks["t"].astype(np.int64), frame_times_us).any():
+        raise ValueError(
+            f"Expected labels at frame times in {path}, got none that agrees with {FRAME_TIMES}; "
+            "put both on one clock"
+        )
+    return tracks

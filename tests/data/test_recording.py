@@ -1,0 +1,170 @@
+"""Sequence folders: what is read, and which faults are named."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from eqs.data import Recording, detection_windows, overlap_us, score_windows
+
+
+def test_reads_everything(tmp_path, make_recording):
+    recording = Recording.load(make_recording(tmp_path / "a", frames=4))
+    assert (recording.name, recording.height, recording.width) == ("a", 24, 32)
+    assert recording.frame_times_us.tolist() == [1_000_000, 1_050_000, 1_100_000, 1_150_000]
+    assert recording.exposures_us.tolist()[0] == [999_500, 1_000_500]
+    assert [path.name for path in recording.frame_paths][:2] == ["000000.png", "000001.png"]
+    assert recording.has_frames
+    assert recording.has_labels
+    assert recording.has_events
+    assert recording.tracks_at(1_050_000)["x"].tolist() == [5.0]
+    assert len(recording.tracks_at(1_050_001)) == 0
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_frames_are_as_stored(tmp_path, make_recording, colour):
+    recording = Recording.load(make_recording(tmp_path / "a", colour=colour))
+    stored = np.asarray(Image.open(recording.frame_paths[2]))
+    np.testing.assert_array_equal(recording.read_frame(2), stored)
+    assert stored.shape == ((24, 32, 3) if colour else (24, 32))
+
+
+def test_labels_are_read_by_name_and_sorted(tmp_path, make_recording, make_tracks):
+    folder = make_recording(tmp_path / "a")
+    tracks = make_tracks([(1_050_000, 7, 0, 9, 9, 0), (1_000_000, 3, 0, 9, 9, 2)])
+    wider = np.dtype([("extra", "<U10"), *((name, "<f8") for name in tracks.dtype.names)])
+    other = np.zeros(2, wider)
+    for name in tracks.dtype.names:
+        other[name] = tracks[name]
+    np.save(folder / "object_detections/left/tracks.npy", other)
+    recording = Recording.load(folder)
+    assert recording.tracks_at(1_000_000)["x"].tolist() == [3.0]
+    assert recording.tracks_at(1_050_000)["class_id"].tolist() == [0]
+
+
+def test_without_labels_or_frames(tmp_path, make_recording):
+    folder = make_recording(tmp_path / "a", tracks=None)
+    recording = Recording.load(folder)
+    assert not recording.has_labels
+    assert len(recording.tracks_at(1_050_000)) == 0
+    shutil.rmtree(folder / "images" / "left")
+    assert not Recording.load(folder, 24, 32).has_frames
+    assert len(Recording.load(folder, 24, 32).frame_times_us) == 6
+    with pytest.raises(ValueError, match=r"sensor size .* no frames to tell it; set data\.size"):
+        Recording.load(folder)
+
+
+def remove_times(folder):
+    (folder / "images/timestamps.txt").unlink()
+
+
+def one_time_less(folder):
+    (folder / "images/timestamps.txt").write_text("1000000\n1050000\n")
+
+
+def backwards(folder):
+    (folder / "images/timestamps.txt").write_text("5\n4\n6\n7\n8\n9\n")
+
+
+def no_numbers(folder):
+    (folder / "images/timestamps.txt").write_text("0.5\n" * 6)
+
+
+def one_frame(folder):
+    for path in sorted((folder / "images/left/distorted").iterdir())[1:]:
+        path.unlink()
+    (folder / "images/timestamps.txt").write_text("1000000\n")
+
+
+def broken_image(folder):
+    (folder / "images/left/distorted/000000.png").write_bytes(b"no image")
+
+
+def other_exposures(folder):
+    (folder / "images/left/exposure_timestamps.txt").write_text("1, 2\n")
+
+
+def no_tracks(folder):
+    (folder / "object_detections/left/tracks.npy").write_bytes(b"\x93NUMPY")
+
+
+def foreign_tracks(folder):
+    np.save(folder / "object_detections/left/tracks.npy", np.zeros(3, [("t", "u8"), ("x", "f4")]))
+
+
+def other_clock(folder):
+    path = folder / "object_detections/left/tracks.npy"
+    tracks = np.load(path)
+    tracks["t"] -= 1_000_000
+    tracks["t"] += 7
+    np.save(path, tracks)
+
+
+def emptied(folder):
+    shutil.rmtree(folder)
+    folder.mkdir()
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (remove_times, "timestamps.txt beside the 6 frames of .*found none"),
+        (one_time_less, "one timestamp per frame .*got 2 lines .* and 6 frames"),
+        (backwards, "rising times of zero or more"),
+        (no_numbers, "whole microseconds in .*timestamps.txt"),
+        (one_frame, "at least two frames .*got one"),
+        (broken_image, "image at .*000000.png"),
+        (other_exposures, r"6 exposures .*shape \(1, 2\)"),
+        (no_tracks, "label array in .*tracks.npy"),
+        (foreign_tracks, "none named y, w, h, class_id"),
+        (other_clock, "labels at frame times .*one clock"),
+        (emptied, "found neither; set data.root"),
+    ],
+)
+def test_faults_are_named(tmp_path, make_recording, damage, message):
+    folder = make_recording(tmp_path / "a")
+    damage(folder)
+    with pytest.raises(ValueError, match=message):
+        Recording.load(folder)
+
+
+def test_wrong_sizes(tmp_path, make_recording):
+    folder = make_recording(tmp_path / "a")
+    with pytest.raises(ValueError, match=r"of 64x48 pixels, got 32x24 .*set data\.size"):
+        Recording.load(folder, 48, 64)
+    Image.fromarray(np.zeros((9, 9), np.uint8)).save(folder / "images/left/distorted/000003.png")
+    with pytest.raises(ValueError, match=r"32x24 pixels, got 9x9 in .*000003\.png"):
+        Recording.load(folder).read_frame(3)
+
+
+def test_missing_folder(tmp_path):
+    with pytest.raises(
+        FileNotFoundError, match=r"recording at .*nothing, found none; set data\.ro"
+    ):
+        Recording.load(Path(tmp_path / "nothing"))
+
+
+def test_windows_end_at_frames():
+    times = np.array([0, 50_000, 100_001, 180_000])
+    windows = detection_windows(times)
+    np.testing.assert_array_equal(windows[:, 1], times[1:])
+    assert set(np.diff(windows, axis=1).ravel()) == {50_000}
+    assert detection_windows(times[:1]).shape == (0, 2)
+
+
+def test_score_windows_are_full_and_adjacent():
+    windows = score_windows(3, 3 + 10 * 50_000 - 1)
+    assert len(windows) == 9
+    assert windows[0, 0] == 3
+    np.testing.assert_array_equal(windows[1:, 0], windows[:-1, 1])
+    assert score_windows(5, 5).shape == (0, 2)
+    assert score_windows(5, 0).shape == (0, 2)
+
+
+def test_overlap_of_frames_and_events():
+    assert overlap_us(np.array([10, 20, 30]), 15, 100) == (15, 30)
+    assert overlap_us(np.array([10, 20, 30]), 0, 25) == (10, 25)
+    assert overlap_us(np.array([10, 20]), 50, 90) == (50, 50)
+    assert overlap_us(np.array([], np.int64), 50, 90) == (50, 50)
