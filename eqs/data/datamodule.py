@@ -1,0 +1,184 @@
+"""The data side of a training: which events feed which phase."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import lightning
+from torch.utils.data import DataLoader, Sampler
+
+from eqs.data.augment import Augmentation
+from eqs.data.datasets import (
+    Batch,
+    Binning,
+    EvaluationDataset,
+    TrainingDataset,
+    WindowSource,
+)
+from eqs.data.labels import LabelProtocol
+from eqs.data.recording import Recording
+from eqs.data.sampling import Sampling
+
+
+class Splits(Protocol):
+    """A data set dealt to train, val and test."""
+
+    def recordings(self, split: str) -> list[Recording]:
+        """The recordings of one split."""
+
+
+class EventPaths(Protocol):
+    """Knows where the events of a recording lie."""
+
+    def path(self, recording: Recording) -> Path:
+        """The recording's event file."""
+
+
+class StepSampler(Sampler[int]):
+    """The steps of one training epoch: `epoch * steps, ..., (epoch + 1) * steps - 1`.
+
+    Epochs only pace validation and checkpoints. What a step holds depends on its number alone, so
+    a training resumed at an epoch's start goes on exactly as one that was never interrupted.
+    """
+
+    def __init__(self, steps: int) -> None:
+        """Start with epoch 0."""
+        self.steps = steps
+        self.epoch = 0
+
+    def set_epoch(self, epoch: int) -> None:
+        """Choose the epoch; the trainer calls this before each one."""
+        self.epoch = epoch
+
+    def __iter__(self) -> Iterator[int]:
+        """The steps of the chosen epoch."""
+        return iter(range(self.epoch * self.steps, (self.epoch + 1) * self.steps))
+
+    def __len__(self) -> int:
+        """Steps per epoch."""
+        return self.steps
+
+
+class EventDataModule(lightning.LightningDataModule):
+    """Training, validation and test batches of one data set.
+
+    Training and validation read the events of one source; each test stream reads those of its own,
+    from the same recordings, so that only the events differ between the tests.
+
+    With several processes each trains its own slots and evaluates its own recordings; the trainer
+    must leave the samplers alone (`use_distributed_sampler: false`).
+
+    Args:
+        dataset: the recordings of each split.
+        protocol: which boxes count.
+        source: the events to train and validate on.
+        tests: the events of each test stream, by its name; the order is that of the loaders.
+        seed: what all draws depend on.
+        batch_size: samples per batch and process.
+        sequence_length: windows per sample.
+        steps_per_epoch: training steps between two ends of an epoch.
+        epochs: number of epochs.
+        sampling: kind of the samples: mixed, stream or random.
+        augmentation: random changes to training samples; none if None.
+        bins: time bins per polarity.
+        window_us: length of a window.
+        count_cutoff: a count stops growing here.
+        evaluation_length: windows per evaluation item; results do not depend on it.
+        num_workers: processes that read beside the training; batches do not depend on it.
+    """
+
+    def __init__(
+        self,
+        dataset: Splits,
+        protocol: LabelProtocol,
+        source: EventPaths,
+        tests: Mapping[str, EventPaths],
+        *,
+        seed: int = 0,
+        batch_size: int = 8,
+        sequence_length: int = 5,
+        steps_per_epoch: int = 100,
+        epochs: int = 20,
+        sampling: Sampling = "mixed",
+        augmentation: Augmentation | None = None,
+        bins: int = 10,
+        window_us: int = 50_000,
+        count_cutoff: int = 10,
+        evaluation_length: int = 10,
+        num_workers: int = 0,
+    ) -> None:
+        """Keep the parts; nothing is read yet."""
+        super().__init__()
+        self.dataset, self.protocol, self.source, self.tests = dataset, protocol, source, tests
+        self.binning = Binning(bins=bins, window_us=window_us, count_cutoff=count_cutoff)
+        self.seed, self.batch_size, self.sequence_length = seed, batch_size, sequence_length
+        self.steps_per_epoch, self.epochs = steps_per_epoch, epochs
+        self.sampling, self.augmentation = sampling, augmentation
+        self.evaluation_length, self.num_workers = evaluation_length, num_workers
+
+    def training_dataset(self, rank: int = 0, world_size: int = 1) -> TrainingDataset:
+        """The training batches of one process."""
+        return TrainingDataset(
+            self.sources("train", self.source),
+            seed=self.seed,
+            steps=self.epochs * self.steps_per_epoch,
+            batch_size=self.batch_size,
+            sequence_length=self.sequence_length,
+            sampling=self.sampling,
+            augmentation=self.augmentation,
+            rank=rank,
+            world_size=world_size,
+        )
+
+    def evaluation_dataset(
+        self, split: str, events: EventPaths, rank: int = 0, world_size: int = 1
+    ) -> EvaluationDataset:
+        """Every window of a split, or of one process's share of its recordings."""
+        sources = self.sources(split, events)[rank::world_size]
+        return EvaluationDataset(sources, chunk_length=self.evaluation_length)
+
+    def sources(self, split: str, events: EventPaths) -> list[WindowSource]:
+        """The recordings of a split with the events of one source."""
+        return [
+            WindowSource(
+                recording=recording,
+                events_path=events.path(recording),
+                protocol=self.protocol,
+                binning=self.binning,
+            )
+            for recording in self.dataset.recordings(split)
+        ]
+
+    def train_dataloader(self) -> DataLoader[Batch]:
+        """The batches of one epoch."""
+        return self._loader(
+            self.training_dataset(*self._process()), StepSampler(self.steps_per_epoch)
+        )
+
+    def val_dataloader(self) -> DataLoader[Batch]:
+        """The validation recordings with the events that the training uses."""
+        return self._loader(self.evaluation_dataset("val", self.source, *self._process()))
+
+    def test_dataloader(self) -> Sequence[DataLoader[Batch]]:
+        """The test recordings with the events of each test stream."""
+        return [
+            self._loader(self.evaluation_dataset("test", events, *self._process()))
+            for events in self.tests.values()
+        ]
+
+    def _process(self) -> tuple[int, int]:
+        """Number of this process and of all of them."""
+        return (self.trainer.global_rank, self.trainer.world_size) if self.trainer else (0, 1)
+
+    def _loader(
+        self, dataset: TrainingDataset | EvaluationDataset, sampler: Sampler[int] | None = None
+    ) -> DataLoader[Batch]:
+        return DataLoader(
+            dataset,
+            batch_size=None,
+            sampler=sampler,
+            num_workers=self.num_workers,
+            persistent_workers=sampler is not None and self.num_workers > 0,
+        )
