@@ -2,6 +2,14 @@
 
 from eqs.study.answer import answer
 from eqs.study.console import print_eqs, print_study
+from eqs.study.figures import (
+    accuracy_bars,
+    event_rate,
+    rate_curves,
+    score_against_accuracy,
+    sequence_dots,
+)
+from eqs.study.pictures import Boxes, detection_panels, event_image, events_panels, score_maps
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
 from eqs.study.statistics import (
@@ -12,6 +20,7 @@ from eqs.study.statistics import (
     correlations,
     write_correlations,
 )
+from eqs.study.style import FIGURE_TEXTS, report_figure, save_figure
 from eqs.study.tables import (
     REFERENCE,
     Drops,
@@ -27,25 +36,38 @@ from eqs.study.tables import (
 )
 
 __all__ = [
+    "FIGURE_TEXTS",
     "REFERENCE",
     "TARGETS",
+    "Boxes",
     "Correlation",
     "Drops",
     "ReportContent",
     "ReportFigure",
     "Target",
+    "accuracy_bars",
     "answer",
     "correlate",
     "correlations",
+    "detection_panels",
     "drops",
     "eqs_table",
+    "event_image",
+    "event_rate",
+    "events_panels",
     "print_eqs",
     "print_study",
     "printed_accuracy",
     "printed_scores",
+    "rate_curves",
     "read_table",
     "render_report",
+    "report_figure",
+    "save_figure",
     "scaled_score",
+    "score_against_accuracy",
+    "score_maps",
+    "sequence_dots",
     "simulated",
     "study_table",
     "summarise_eqs",

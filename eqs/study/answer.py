@@ -9,10 +9,13 @@ import numpy as np
 import pandas as pd
 
 from eqs.study.statistics import SIMULATORS_NEEDED, Correlation
-from eqs.study.tables import REFERENCE, simulated, summarise_eqs, summarise_study
-
-RATIO_FLOOR = 0.10
-"""Below this simulated mAP a ratio rests on too little to be read."""
+from eqs.study.tables import (
+    RATIO_FLOOR,
+    REFERENCE,
+    simulated,
+    summarise_eqs,
+    summarise_study,
+)
 
 
 def answer(
@@ -102,6 +105,11 @@ def _lost(row: pd.Series) -> str:
 def _foreseen(systems: pd.DataFrame, results: Sequence[Correlation]) -> str:
     known = systems.dropna(subset=["eqs", "map_real"])
     pairs = list(itertools.combinations(zip(known["eqs"], known["map_real"], strict=True), 2))
+    if not pairs:
+        return (
+            "Whether EQS saw it coming cannot be asked yet: fewer than two simulators have both a "
+            "score and an accuracy on real events."
+        )
     agree = sum((a[0] - b[0]) * (a[1] - b[1]) > 0 for a, b in pairs)
     words = (
         f"Did EQS see it coming? It puts {agree} of {len(pairs)} pairs of simulators in the "

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import pandas as pd
 
 from eqs.study.printed import printed_accuracy, printed_scores
-from eqs.study.tables import MAP_COLUMNS, REFERENCE, score_columns, simulated, summarise_eqs
+from eqs.study.tables import (
+    MAP_COLUMNS,
+    RATIO_FLOOR,
+    REFERENCE,
+    score_columns,
+    simulated,
+    summarise_eqs,
+)
 
 MISSING = "n/a"
 PERCENT_COLUMNS = frozenset({*MAP_COLUMNS, "drop_abs", "drop_rel", "map_sim_sd", "map_real_sd"})
@@ -49,11 +56,16 @@ def number(value: object, name: str = "") -> str:
 
 
 def scores_table(eqs: pd.DataFrame) -> Table:
-    """EQS by sequence and simulator with the average below, as in the paper's table."""
+    """EQS by sequence and simulator with the average below, as in the paper's table.
+
+    Convention: where a simulator lacks a sequence, the average covers the sequences of all.
+    """
     wide = simulated(eqs).pivot(index="sequence", columns="system", values="eqs")
     wide = wide[list(dict.fromkeys(simulated(eqs)["system"]))].sort_index()
-    if len(wide):
-        wide.loc["average"] = wide.mean()
+    complete = wide.dropna()
+    if len(complete):
+        name = "average" if len(complete) == len(wide) else "average of complete rows"
+        wide.loc[name] = complete.mean()
     return _best_per_row(wide, "Sequence")
 
 
@@ -74,8 +86,8 @@ def accuracy_table(systems: pd.DataFrame) -> Table:
                 str(row["system"]) + (" (no simulator)" if row["simulator"] == REFERENCE else ""),
                 _with_spread(row, "map_sim"),
                 _with_spread(row, "map_real"),
-                *(number(row[name], name) for name in ("drop_abs", "drop_rel")),
-                number(row["retention"]),
+                number(row["drop_abs"], "drop_abs"),
+                *(_ratio(row, name) for name in ("drop_rel", "retention")),
                 number(row["eqs"]),
                 *(number(theirs.get(name), name) for name in ("map_sim", "map_real")),
                 *(number(theirs.get(name), name) for name in ("drop_abs", "drop_rel")),
@@ -120,6 +132,10 @@ def _best_per_row(wide: pd.DataFrame, corner: str) -> Table:
         strong |= {(place, 1 + at) for at, value in enumerate(row) if value == row.max()}
     header = (corner, *map(str, wide.columns))
     return Table(header=header, rows=tuple(rows), strong=frozenset(strong))
+
+
+def _ratio(row: pd.Series, name: str) -> str:
+    return number(row[name], name) + " *" * bool(row["map_sim"] < RATIO_FLOOR)
 
 
 def _with_spread(row: pd.Series, name: str) -> str:

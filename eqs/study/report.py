@@ -22,7 +22,7 @@ from eqs.study.layout import (
 )
 from eqs.study.printed import ACCURACY_TABLE, SCORES_TABLE
 from eqs.study.statistics import SIMULATORS_NEEDED, Correlation
-from eqs.study.tables import REFERENCE, summarise_study, write_text
+from eqs.study.tables import RATIO_FLOOR, REFERENCE, summarise_study, write_text
 
 MEDIA_TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 
@@ -98,6 +98,7 @@ def render_report(content: ReportContent) -> str:
         figures=[_figure(*entry) for entry in content.figures.values()],
         cards={name: list(card.items()) for name, card in content.cards.items()},
         total_s=sum(content.timings.values()),
+        floor=f"{100 * RATIO_FLOOR:.0f}",
         needed=SIMULATORS_NEEDED,
         reference=REFERENCE,
         scores_number=SCORES_TABLE,

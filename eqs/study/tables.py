@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 REFERENCE = "real"
 """The system without a simulator: a detector trained on the recorded events themselves."""
 
+RATIO_FLOOR = 0.10
+"""Below this simulated mAP a ratio to it rests on too little to be read."""
+
 MAP_COLUMNS = ("map_sim", "map50_sim", "map_real", "map50_real")
 STUDY_COLUMNS = (
     "simulator",
@@ -143,8 +146,8 @@ def eqs_table(rows: Iterable[Mapping[str, Any]] | pd.DataFrame) -> pd.DataFrame:
         rows: each with `simulator`, `sequence` and `eqs`; chance and ceiling where known.
 
     Raises:
-        ValueError: a column is missing, a (system, sequence) occurs twice, or a value is an
-            absolute path.
+        ValueError: a column is missing, a (system, sequence) occurs twice, a value is an
+            absolute path, or the rows stem from several definitions or judges.
     """
     table = _frame(rows, required=("simulator", "sequence", "eqs"), name="EQS")
     table = _complete(table, EQS_COLUMNS)
@@ -154,6 +157,13 @@ def eqs_table(rows: Iterable[Mapping[str, Any]] | pd.DataFrame) -> pd.DataFrame:
     table["eqs_scaled"] = scaled_score(table["eqs"], table["eqs_chance"], table["eqs_ceiling"])
     for name in COUNT_COLUMNS:
         table[name] = table[name].astype("Int64")
+    for name in ("definition", "weights_sha256"):
+        found = sorted(table[name].dropna().unique())
+        if len(found) > 1:
+            raise ValueError(
+                f"Expected scores of one {name}, got {', '.join(found)}; scores of different "
+                "ones cannot be compared, so write one table for each"
+            )
     return _checked(table, key=("system", "sequence"))
 
 

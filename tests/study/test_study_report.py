@@ -16,8 +16,10 @@ from eqs.study import (
     print_study,
     render_report,
     study_table,
+    summarise_study,
     write_report,
 )
+from eqs.study.layout import accuracy_table, scores_table
 
 VOID = {"meta", "img", "br", "link", "hr"}
 PIXEL = base64.b64decode(
@@ -170,6 +172,27 @@ def test_answer_without_runs_or_scores(scores):
     assert "nothing is known here about accuracy" in answer(scores)[1]
     unscored = scores.assign(eqs=np.nan)
     assert answer(unscored)[0] == "No simulator has been scored yet."
+
+
+def test_answer_with_one_simulator_asks_for_another(study, scores):
+    foreseen = answer(scores, study[study["system"].isin(["real", "esim"])])[2]
+    assert "fewer than two simulators" in foreseen
+
+
+def test_ratios_to_next_to_nothing_are_starred(study):
+    weak = study.assign(map_sim=0.05, map_real=0.02)
+    rows = accuracy_table(summarise_study(weak)).rows
+    assert all(row[4].endswith(" *") and row[5].endswith(" *") for row in rows)
+    rows = accuracy_table(summarise_study(study)).rows
+    assert not any("*" in cell for row in rows for cell in row)
+
+
+def test_average_covers_the_sequences_every_simulator_has(scores):
+    table = scores_table(scores.iloc[1:])
+    assert table.rows[0][1] == "n/a"
+    assert table.rows[-1][0] == "average of complete rows"
+    own = scores[(scores["system"] == "v2e")]["eqs"].iloc[1:]
+    assert table.rows[-1][2] == f"{own.mean():.3f}"
 
 
 def test_console_shows_what_the_tables_hold(study, scores):

@@ -119,6 +119,12 @@ def test_eqs_table_works_without_anchors_and_counts():
     assert summarise_eqs(table)["eqs"].tolist() == [0.25]
 
 
+def test_scores_of_two_definitions_do_not_share_a_table(scores):
+    mixed = scores.assign(definition=["aa"] * 6 + ["bb"] * 6)
+    with pytest.raises(ValueError, match="scores of one definition, got aa, bb"):
+        eqs_table(mixed)
+
+
 def test_tables_survive_the_disk_exactly(tmp_path, study, scores):
     for name, table in {"study": study, "eqs": scores}.items():
         path = write_table(table, tmp_path / "results" / f"{name}.csv")

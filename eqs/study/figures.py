@@ -1,0 +1,270 @@
+"""Charts of a study's tables: points, bars and curves, with the good direction on every axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import ArrayLike, NDArray
+
+from eqs.events import Events
+from eqs.study.statistics import SIMULATORS_NEEDED, Correlation
+from eqs.study.style import MARKERS, STYLE, colours, figure
+from eqs.study.tables import REFERENCE, simulated, summarise_eqs, summarise_study
+
+# Column, axis label, factor from the table's unit to the axis.
+PANELS = (
+    ("map_real", "mAP on real events\n(higher is better)", 100.0),
+    ("retention", "retention: real / simulated mAP\n(higher is better)", 1.0),
+    ("drop_rel", "relative drop: 1 - real / simulated, %\n(lower is better)", 100.0),
+    ("drop_abs", "absolute drop: simulated - real, points\n(lower is better)", 100.0),
+)
+SCORE_LABEL = "EQS (higher is better)"
+ANCHOR: dict[str, Any] = {"color": "#999999", "linewidth": 1.0, "zorder": 1}
+
+
+def score_against_accuracy(
+    study: pd.DataFrame, eqs: pd.DataFrame, results: Sequence[Correlation] = ()
+) -> Figure:
+    """Four panels: EQS against real mAP, retention, relative and absolute drop.
+
+    Args:
+        study: one row per (system, seed).
+        eqs: one row per (system, sequence), for the chance and ceiling lines.
+        results: correlations; only one that allows a conclusion is printed in its panel.
+    """
+    systems = summarise_study(study)
+    tested = simulated(systems)
+    anchors = summarise_eqs(simulated(eqs))[["eqs_chance", "eqs_ceiling"]].mean()
+    by_target = {result.target.name: result for result in results if result.score == "eqs"}
+    with mpl.rc_context(STYLE):
+        drawing = figure(9, 7.2)
+        for axes, (column, label, factor) in zip(drawing.subplots(2, 2).flat, PANELS, strict=True):
+            _points(axes, tested, study, column, factor)
+            _anchor_lines(axes, anchors)
+            axes.set(xlabel=SCORE_LABEL, ylabel=label, title=_verdict(by_target.get(column)))
+            axes.margins(x=0.12, y=0.18)
+            if column == "map_real":
+                _reference_line(axes, systems)
+    return drawing
+
+
+def _points(
+    axes: Axes, systems: pd.DataFrame, study: pd.DataFrame, column: str, factor: float
+) -> None:
+    spread = factor * study.groupby("system")[column].std()
+    colour = colours(systems["system"])
+    for at, (_, row) in enumerate(systems.iterrows()):
+        x, y = row["eqs"], factor * row[column]
+        if not (np.isfinite(x) and np.isfinite(y)):
+            continue
+        error = spread[row["system"]]
+        axes.errorbar(
+            x,
+            y,
+            yerr=error if np.isfinite(error) else None,
+            fmt=MARKERS[at % len(MARKERS)],
+            color=colour[row["system"]],
+            markersize=8,
+            capsize=3,
+        )
+        axes.annotate(row["system"], (x, y), xytext=(8, 5), textcoords="offset points")
+
+
+def _anchor_lines(axes: Axes, anchors: pd.Series) -> None:
+    for name, style in (("chance", ":"), ("ceiling", "-.")):
+        value = anchors[f"eqs_{name}"]
+        if np.isfinite(value):
+            axes.axvline(value, linestyle=style, **ANCHOR)
+            axes.annotate(
+                name,
+                (value, 0.02),
+                xycoords=("data", "axes fraction"),
+                xytext=(-3, 0),
+                textcoords="offset points",
+                rotation=90,
+                ha="right",
+                va="bottom",
+                color="#666666",
+            )
+
+
+def _reference_line(axes: Axes, systems: pd.DataFrame) -> None:
+    reference = systems[systems["simulator"] == REFERENCE]["map_real"].dropna()
+    if len(reference):
+        axes.axhline(100 * reference.iloc[0], color="#000000", linestyle="--", linewidth=1)
+        axes.annotate(
+            "trained on real events",
+            (0.99, 100 * reference.iloc[0]),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="right",
+        )
+
+
+def _verdict(result: Correlation | None) -> str:
+    if result is None:
+        return ""
+    if result.concludes and result.interval_pearson is not None:
+        low, high = result.interval_pearson
+        return (
+            f"r = {result.pearson:.2f} [{low:.2f}, {high:.2f}], n = {result.n} systems in "
+            f"{result.families} families"
+        )
+    if result.families < SIMULATORS_NEEDED:
+        return f"{result.families} simulators: too few to conclude anything"
+    return "One seed or no spread: no conclusion"
+
+
+def accuracy_bars(study: pd.DataFrame) -> Figure:
+    """Simulated and real mAP of every system side by side, times 100."""
+    systems = summarise_study(study)
+    colour = colours(systems["system"])
+    place = np.arange(len(systems))
+    sides = (("map_sim", -0.2, 0.45, "simulated"), ("map_real", 0.2, 1.0, "real"))
+    with mpl.rc_context({**STYLE, "axes.grid.axis": "y"}):
+        drawing = figure(max(5.0, 1.6 * len(systems) + 1), 3.8)
+        axes = drawing.subplots()
+        for column, shift, alpha, _ in sides:
+            heights = 100 * systems[column].to_numpy(dtype=float)
+            if column == "map_sim":  # the reference has one test set, not two
+                heights = np.where(systems["simulator"] == REFERENCE, np.nan, heights)
+            bars = axes.bar(
+                place + shift,
+                heights,
+                0.38,
+                color=[colour[name] for name in systems["system"]],
+                alpha=alpha,
+            )
+            spread = 100 * systems[f"{column}_sd"].to_numpy(dtype=float)
+            known = np.isfinite(spread) & np.isfinite(heights)
+            axes.errorbar(
+                (place + shift)[known],
+                heights[known],
+                yerr=spread[known],
+                fmt="none",
+                ecolor="#333333",
+                capsize=3,
+            )
+            texts = [f"{height:.1f}" if np.isfinite(height) else "" for height in heights]
+            axes.bar_label(bars, labels=texts, padding=4)
+        names = [
+            "real events\n(no simulator)" if row["simulator"] == REFERENCE else row["system"]
+            for _, row in systems.iterrows()
+        ]
+        axes.set_xticks(place, names)
+        axes.set(ylabel="mAP (higher is better)", xlabel="detector trained on")
+        axes.margins(y=0.15)
+        keys = [
+            Line2D([], [], marker="s", markersize=9, linestyle="", color="#555555", alpha=alpha)
+            for _, _, alpha, _ in sides
+        ]
+        drawing.legend(
+            keys,
+            ["tested on its simulated events", "tested on real events"],
+            loc="outside upper left",
+            ncols=2,
+        )
+    return drawing
+
+
+def sequence_dots(eqs: pd.DataFrame) -> Figure:
+    """EQS of every sequence by system, the same sequence joined, with chance and ceiling."""
+    table = simulated(eqs)
+    wide = table.pivot(index="sequence", columns="system", values="eqs")
+    names = list(dict.fromkeys(table["system"]))
+    colour = colours(names)
+    place = np.arange(len(names))[::-1]
+    with mpl.rc_context({**STYLE, "axes.grid.axis": "x"}):
+        drawing = figure(7.5, 1.4 + 0.6 * len(names))
+        axes = drawing.subplots()
+        _anchor_lines(axes, summarise_eqs(table)[["eqs_chance", "eqs_ceiling"]].mean())
+        for _, row in wide[names].iterrows():
+            axes.plot(row, place, color="#bbbbbb", linewidth=0.7, zorder=2)
+        for name, height in zip(names, place, strict=True):
+            values = wide[name].to_numpy(dtype=float)
+            axes.scatter(values, np.full(len(values), height), s=28, color=colour[name], zorder=3)
+            if np.isfinite(values).any():
+                mean = np.nanmean(values)
+                axes.plot(mean, height, "|", color="black", markersize=24, markeredgewidth=2)
+                axes.annotate(
+                    f"{mean:.3f}",
+                    (mean, height),
+                    xytext=(0, 13),
+                    textcoords="offset points",
+                    ha="center",
+                )
+        axes.set_yticks(place, names)
+        axes.set_ylim(-0.6, len(names) - 0.4)
+        axes.set_xlabel(SCORE_LABEL)
+    return drawing
+
+
+def event_rate(events: Events, start_us: int, stop_us: int, bin_us: int) -> NDArray[np.float64]:
+    """Events per pixel and second in consecutive bins; a last bin cut short is left out.
+
+    Raises:
+        ValueError: the window holds no whole bin.
+    """
+    bins = (stop_us - start_us) // bin_us
+    if bins < 1:
+        raise ValueError(
+            f"Expected a window of at least one bin of {bin_us} us, got {stop_us - start_us} us; "
+            "set a longer window or a shorter bin"
+        )
+    inside = events.window(start_us, start_us + bins * bin_us)
+    counts = np.bincount((inside.t - start_us) // bin_us, minlength=bins)
+    return counts * 1e6 / (bin_us * events.height * events.width)
+
+
+def rate_curves(
+    rates: Mapping[str, ArrayLike], *, bin_us: int, frame_times_us: ArrayLike = ()
+) -> Figure:
+    """Event rates over time of every stream.
+
+    Args:
+        rates: by stream, as `event_rate` gives them, from one common start.
+        bin_us: length of a bin.
+        frame_times_us: times of video frames since that start, drawn as ticks.
+    """
+    colour = colours(rates)
+    with mpl.rc_context(STYLE):
+        drawing = figure(9, 3.8)
+        axes = drawing.subplots()
+        for name, values in sorted(rates.items(), key=lambda item: item[0] == REFERENCE):
+            heights = np.asarray(values, dtype=float)
+            real = name == REFERENCE
+            axes.stairs(
+                heights,
+                np.arange(len(heights) + 1) * bin_us / 1e6,
+                color=colour[name],
+                linewidth=1.8 if real else 1.1,
+                label="real sensor" if real else name,
+                baseline=None,
+            )
+        axes.set_ylim(bottom=0)
+        frames_s = np.asarray(frame_times_us, dtype=float) / 1e6
+        if len(frames_s):
+            axes.plot(
+                frames_s,
+                np.zeros(len(frames_s)),
+                "|",
+                color="#777777",
+                markersize=7,
+                clip_on=False,
+                label="video frames",
+            )
+        axes.set(
+            xlabel="time, s",
+            ylabel="events per pixel and second\n(closer to the real sensor is better)",
+        )
+        axes.margins(x=0)
+        drawing.legend(loc="outside upper left", ncols=len(rates) + 1)
+    return drawing
