@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from eqs.events import Events
+from eqs.events import EventReader, Events
 from eqs.metrics.definition import Definition
 from eqs.representations import stacked_histogram
 
@@ -20,24 +19,8 @@ PIXELS_PER_CHUNK = 8 * 480 * 640
 LONGEST_CHUNK = 32
 
 
-class EventSource(Protocol):
-    """What a stream must offer: `Events` in memory and readers of files both do."""
-
-    @property
-    def height(self) -> int:
-        """Rows of the sensor."""
-
-    @property
-    def width(self) -> int:
-        """Columns of the sensor."""
-
-    def __len__(self) -> int:
-        """Number of events."""
-
-    def window(self, start_us: int, stop_us: int) -> Events:
-        """The events with `start_us <= t < stop_us`."""
-
-
+# A stream in memory or in a file, or its histograms (windows, 2 * bins, height, width).
+EventSource = Events | EventReader
 Stream = EventSource | Tensor
 
 
@@ -47,7 +30,7 @@ def extent_us(stream: EventSource) -> tuple[int, int] | None:
         return None
     if isinstance(stream, Events):
         return int(stream.t[0]), int(stream.t[-1]) + 1
-    return int(stream.start_us), int(stream.stop_us)  # type: ignore[attr-defined]
+    return stream.start_us, stream.stop_us
 
 
 def check_sensors(streams: Sequence[EventSource]) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from eqs.events import Events
+from eqs.events import EventReader, Events
 from eqs.metrics import Definition, group_chunks, window_starts
 from eqs.metrics.windows import chunk_length
 from eqs.representations import stacked_histogram
@@ -89,3 +89,13 @@ def test_chunks_shrink_as_frames_grow():
     assert chunk_length(2, 480, 640) == 4
     assert chunk_length(2, 96, 128) == 32
     assert chunk_length(99, 720, 1280) == 1
+
+
+def test_files_and_memory_give_the_same_chunks(make_events, tmp_path):
+    events = make_events(1)
+    events.save(tmp_path / "events.h5")
+    with EventReader(tmp_path / "events.h5") as reader:
+        from_file, count = group_chunks([events, reader], Definition(bins=2))
+        for chunk in from_file:
+            assert torch.equal(chunk[:, 0], chunk[:, 1])
+    assert count == (int(events.t[-1]) + 1 - int(events.t[0])) // 50_000
