@@ -1,0 +1,308 @@
+"""Writes `dsec_mini`: rendered recordings in the layout of DSEC and DSEC-Detection."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from PIL import Image
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from eqs.events.store import EventWriter
+from eqs.files import read_json, write_json
+from eqs.scenes.camera import FrameCamera
+from eqs.scenes.labels import LabelRule
+from eqs.scenes.sensor import ReferenceSensor
+from eqs.scenes.world import DrivingWorld
+
+VERSION: Final = 1  # raise it whenever the same parameters give other files
+FRAME_PERIOD_US: Final = 50_000
+LEAD_IN_US: Final = 60_000  # events before the first frame
+LEAD_OUT_US: Final = 10_000  # and after the last one
+SPLITS: Final = {"train": 0, "val": 1, "test": 2}
+RECORD: Final = "sequence.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """One sequence to render: everything its files depend on.
+
+    Args:
+        split: train, val or test.
+        index: number within the split.
+        height: rows of both cameras.
+        width: columns of both cameras.
+        frames: number of frames, 20 per second.
+        seed: seed of the data set.
+        sensor: the reference event camera.
+        camera: the frame camera.
+        rule: which actors are labelled.
+    """
+
+    split: str
+    index: int
+    height: int
+    width: int
+    frames: int
+    seed: int
+    sensor: ReferenceSensor
+    camera: FrameCamera = field(default_factory=FrameCamera)
+    rule: LabelRule = field(default_factory=LabelRule)
+
+    @property
+    def night(self) -> bool:
+        """Every fourth recording."""
+        return self.index % 4 == 1
+
+    @property
+    def still(self) -> bool:
+        """Every tenth recording is made while waiting."""
+        return self.index % 10 == 7
+
+    @property
+    def name(self) -> str:
+        """Folder name."""
+        return f"mini_{self.split}_{self.index:03d}_{'night' if self.night else 'day'}"
+
+    @property
+    def key(self) -> tuple[int, int, int]:
+        """Integers from which all of the recording's randomness is drawn."""
+        return (self.seed, SPLITS[self.split], self.index)
+
+    @property
+    def t_offset_us(self) -> int:
+        """When the event camera was switched on, on the recording's own clock."""
+        rng = np.random.default_rng(np.random.SeedSequence([*self.key, 1]))
+        return int(rng.integers(40_000_000_000, 60_000_000_000))
+
+    def description(self) -> dict[str, Any]:
+        """What the files depend on, to recognise them again."""
+        return {**asdict(self), "version": VERSION}
+
+    def write(self, root: Path) -> dict[str, Any]:
+        """Render into `root/split/name`, which appears when it is complete.
+
+        A folder that was completed earlier with the same description is kept as it is.
+
+        Returns:
+            The sequence's record: counts and description.
+        """
+        folder = root / self.split / self.name
+        if (folder / RECORD).is_file():
+            record = read_json(folder / RECORD)
+            if record["description"] == self.description():
+                return record
+        partial = folder.with_name(folder.name + ".partial")
+        for old in (partial, folder):
+            if old.exists():
+                shutil.rmtree(old)
+        partial.mkdir(parents=True)
+        record = self._render(partial)
+        write_json(partial / RECORD, record)
+        partial.replace(folder)
+        return record
+
+    def _render(self, folder: Path) -> dict[str, Any]:
+        duration_us = LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
+        world = DrivingWorld(
+            height=self.height,
+            width=self.width,
+            seed=(*self.key, 0),
+            night=self.night,
+            still=self.still,
+            duration_s=1e-6 * duration_us,
+        )
+        times = LEAD_IN_US + FRAME_PERIOD_US * np.arange(self.frames, dtype=np.int64)
+        exposure_us = self._write_frames(folder, world, times)
+        boxes = [self.rule.boxes(world.view(int(t)), int(t) + self.t_offset_us) for t in times]
+        (folder / "object_detections/left").mkdir(parents=True)
+        tracks = np.concatenate(boxes)
+        np.save(folder / "object_detections/left/tracks.npy", tracks)
+        events, on = self._write_events(folder, world, duration_us)
+        classes, counts = np.unique(tracks["class_id"], return_counts=True)
+        return {
+            "name": self.name,
+            "frames": self.frames,
+            "duration_us": duration_us,
+            "exposure_us": exposure_us,
+            "events": events,
+            "on_events": on,
+            "boxes": {str(c): int(n) for c, n in zip(classes, counts, strict=True)},
+            "occluded_boxes": int((tracks["visibility"] < 0.9).sum()),
+            "description": self.description(),
+        }
+
+    def _write_frames(self, folder: Path, world: DrivingWorld, times: np.ndarray) -> int:
+        pictures = folder / "images/left/distorted"
+        pictures.mkdir(parents=True)
+        exposure = self.camera.meter(world.radiance(float(times[len(times) // 2])))
+        for k, t in enumerate(times):
+            frame = self.camera.expose(world.radiance, int(t), exposure, (*self.key, 2, k))
+            Image.fromarray(frame).save(pictures / f"{k:06d}.png")
+        stamps = times + self.t_offset_us
+        half = exposure.time_us // 2
+        lines = "".join(f"{t}\n" for t in stamps)
+        (folder / "images/timestamps.txt").write_text(lines)
+        spans = "".join(f"{t - half}, {t + half}\n" for t in stamps)
+        (folder / "images/left/exposure_timestamps.txt").write_text(
+            "# exposure start, exposure end\n" + spans
+        )
+        return exposure.time_us
+
+    def _write_events(self, folder: Path, world: DrivingWorld, duration_us: int) -> tuple[int, int]:
+        (folder / "events/left").mkdir(parents=True)
+        stream = self.sensor.start(
+            self.height, self.width, noise_key=(*self.key, 3), start_us=self.t_offset_us
+        )
+        instants = range(0, duration_us + 1, self.sensor.step_us)
+        total = on = 0
+        with EventWriter(
+            folder / "events/left/events.h5",
+            self.height,
+            self.width,
+            t_offset_us=self.t_offset_us,
+        ) as writer:
+            for first in range(0, len(instants), 50):
+                part = np.stack([world.radiance(t) for t in instants[first : first + 50]])
+                events = stream.step(part)
+                writer.append(events)
+                total, on = total + len(events), on + int(events.p.sum())
+            events = stream.finish()
+            writer.append(events)
+        return total + len(events), on + int(events.p.sum())
+
+
+@dataclass(frozen=True, kw_only=True)
+class DSECMini:
+    """The embedded data set: a rendered street seen by a frame camera and a reference sensor.
+
+    Args:
+        size: width and height in pixels, as in "128x96".
+        sequences: number of recordings per split.
+        frames: frames per recording, 20 per second.
+        seed: draws every recording; one seed is one data set, whatever the worker count.
+        sensor: the reference event camera.
+        workers: processes; None for one per core.
+
+    Raises:
+        ValueError: a size, split or count makes no sense.
+    """
+
+    size: str = "128x96"
+    sequences: Mapping[str, int] = field(
+        default_factory=lambda: {"train": 40, "val": 5, "test": 10}
+    )
+    frames: int = 60
+    seed: int = 0
+    sensor: ReferenceSensor = field(default_factory=ReferenceSensor)
+    workers: int | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be generated."""
+        width, separator, height = self.size.partition("x")
+        if not (separator and width.isdigit() and height.isdigit() and int(width) * int(height)):
+            raise ValueError(
+                f"Expected a size like 128x96, got {self.size!r}; set data.generator.size"
+            )
+        unknown = set(self.sequences) - set(SPLITS)
+        if unknown or any(count < 0 for count in self.sequences.values()):
+            raise ValueError(
+                f"Expected counts for {list(SPLITS)}, got {dict(self.sequences)}; "
+                "set data.generator.sequences"
+            )
+        if self.frames < 2:
+            raise ValueError(
+                f"Expected at least 2 frames, got {self.frames}; set data.generator.frames"
+            )
+
+    def recordings(self) -> list[Recording]:
+        """All sequences, in the order of their names."""
+        width, height = (int(number) for number in self.size.split("x"))
+        return [
+            Recording(
+                split=split,
+                index=index,
+                height=height,
+                width=width,
+                frames=self.frames,
+                seed=self.seed,
+                sensor=self.sensor,
+            )
+            for split, count in self.sequences.items()
+            for index in range(count)
+        ]
+
+    def generate(self, root: Path | str) -> Path:
+        """Render what is missing below `root` and write `manifest.json` last.
+
+        Interrupted anywhere, the next call keeps the finished recordings.
+
+        Returns:
+            `root`.
+        """
+        root = Path(root)
+        wanted = self._description()
+        manifest = root / "manifest.json"
+        if manifest.is_file() and read_json(manifest).get("parameters") == wanted:
+            return root
+        records = sorted(self._records(root), key=lambda record: str(record["name"]))
+        for record in records:
+            del record["description"]
+        write_json(
+            manifest,
+            {
+                "parameters": wanted,
+                "sensor_hash": self.sensor.definition_hash(),
+                "sequences": records,
+            },
+        )
+        return root
+
+    def _description(self) -> dict[str, Any]:
+        """Everything the files depend on, as it reads back from JSON."""
+        return json.loads(
+            json.dumps(
+                {
+                    "version": VERSION,
+                    "size": self.size,
+                    "sequences": dict(self.sequences),
+                    "frames": self.frames,
+                    "seed": self.seed,
+                    "sensor": asdict(self.sensor),
+                    "camera": asdict(FrameCamera()),
+                    "rule": asdict(LabelRule()),
+                }
+            )
+        )
+
+    def _records(self, root: Path) -> list[dict[str, Any]]:
+        recordings = self.recordings()
+        workers = min(self.workers or os.cpu_count() or 1, len(recordings))
+        jobs = [(recording, root) for recording in recordings]
+        if workers <= 1:
+            return self._follow(map(_write, jobs), len(jobs))
+        # A fresh interpreter per worker: nothing inherited, and the same on every system.
+        with multiprocessing.get_context("spawn").Pool(workers) as pool:
+            return self._follow(pool.imap_unordered(_write, jobs), len(jobs))
+
+    def _follow(self, records: Iterable[dict[str, Any]], total: int) -> list[dict[str, Any]]:
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns) as progress:
+            return list(progress.track(records, total=total, description=f"dsec_mini {self.size}"))
+
+
+def _write(job: tuple[Recording, Path]) -> dict[str, Any]:
+    recording, root = job
+    return recording.write(root)

@@ -1,0 +1,349 @@
+"""Compiled step from actors to painted polygons in image coordinates at one instant."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from eqs.scenes.actors import (
+    ALBEDO,
+    ANY,
+    ATOP,
+    BACK,
+    DEPTH_SORT,
+    EMIT,
+    FRONT,
+    FRUSTUM,
+    HEADING,
+    HIGH,
+    LIFT,
+    LOW,
+    MODE,
+    PANE,
+    PHASE,
+    RATE,
+    RIGHT,
+    SEEN_FROM,
+    SHADOW,
+    SHAPE,
+    SOLID,
+    SPEED,
+    SWING,
+    WHEEL,
+    X,
+    Z,
+)
+from eqs.scenes.optics import (
+    CAM_COS,
+    CAM_SIN,
+    CAM_X,
+    CAM_Z,
+    FOCAL,
+    MID_COLUMN,
+    MID_ROW,
+    Array,
+    convex_hull,
+    project,
+    set_edges,
+    signed_area,
+)
+
+FAR_M: Final = 110.0
+CORNERS: Final = 8
+
+Lit = tuple[float, float, float, float]  # direction to the camera (x, z), headlights, lamps
+POLYGONS_PER_ACTOR: Final = 40
+BEAM_REACH_M: Final = 14.0  # depth at which headlights have lost half their effect
+LAMP_POOL_M: Final = 7.0  # half width of the pool of light under a street lamp
+PANE_INSET: Final = 0.18
+
+# Columns of a light vector: illuminance of a white surface at the focal plane, in lux; the sun's
+# horizontal direction; whether it is night; spacing of street lamps; radiance of the haze.
+AMBIENT, SUN, SUN_X, SUN_Z, BEAM, POOL, LAMP_SPACING, HAZE, HAZE_REACH = range(9)
+LIGHT_COLUMNS: Final = 9
+
+# Columns of polygon marks and values.
+EDGES, JOIN, X0, X1, Y0, Y1 = range(6)
+COLOUR, RING, STRENGTH = range(3)
+
+
+class Polygons(NamedTuple):
+    """Reusable storage for the polygons of one instant.
+
+    Args:
+        edges: half planes, shape (n, 8, 3).
+        marks: number of edges, way of joining, pixel bounds, shape (n, 6).
+        values: radiance in lux, ring width in pixels, opacity, shape (n, 3).
+        spans: first and one past last polygon of each actor, shape (actors, 2).
+        boxes: left, top, right, bottom of each actor's whole outline in pixels, shape (actors, 4).
+        order: actors from far to near, shape (actors,).
+        scratch: room for the corners of one part, shape (4, 16, 2).
+    """
+
+    edges: Array
+    marks: NDArray[np.int32]
+    values: Array
+    spans: NDArray[np.int32]
+    boxes: Array
+    order: NDArray[np.int64]
+    scratch: Array
+
+    @classmethod
+    def room_for(cls, actors: int) -> Polygons:
+        """Storage for this many actors."""
+        count = max(1, actors * POLYGONS_PER_ACTOR)
+        return cls(
+            edges=np.zeros((count, CORNERS, 3)),
+            marks=np.zeros((count, 6), np.int32),
+            values=np.zeros((count, 3)),
+            spans=np.zeros((actors, 2), np.int32),
+            boxes=np.zeros((actors, 4)),
+            order=np.zeros(actors, np.int64),
+            scratch=np.zeros((4, 16, 2)),
+        )
+
+
+@njit(cache=True, error_model="numpy")
+def _store(
+    polygons: Polygons,
+    used: int,
+    corners: Array,
+    count: int,
+    join: int,
+    colour: float,
+    ring_px: float,
+    strength: float,
+    camera: Array,
+) -> int:
+    edges = set_edges(corners, count, polygons.edges[used])
+    if edges == 0:
+        return used
+    left, right, top, bottom = 1e9, -1e9, 1e9, -1e9
+    for i in range(count):
+        left, right = min(left, corners[i, 0]), max(right, corners[i, 0])
+        top, bottom = min(top, corners[i, 1]), max(bottom, corners[i, 1])
+    width, height = 2.0 * camera[MID_COLUMN], 2.0 * camera[MID_ROW]
+    if right < -1.0 or bottom < -1.0 or left > width + 1.0 or top > height + 1.0:
+        return used
+    marks = polygons.marks[used]
+    marks[EDGES], marks[JOIN] = edges, join
+    marks[X0] = max(0.0, math.floor(left - 0.5))
+    marks[X1] = min(width, math.ceil(right + 0.5))
+    marks[Y0] = max(0.0, math.floor(top - 0.5))
+    marks[Y1] = min(height, math.ceil(bottom + 0.5))
+    values = polygons.values[used]
+    values[COLOUR], values[RING], values[STRENGTH] = colour, ring_px, strength
+    return used + 1
+
+
+@njit(cache=True, error_model="numpy")
+def _face_light(nx: float, nz: float, up: float, light: Array, lit: Lit) -> float:
+    """Illuminance of a face; `lit` is view direction x, z, then beam and lamp light here."""
+    sun = max(0.0, nx * light[SUN_X] + nz * light[SUN_Z]) + 0.8 * up
+    towards = max(0.2, nx * lit[0] + nz * lit[1])
+    return light[AMBIENT] + light[SUN] * sun + lit[2] * towards + lit[3] * (0.5 + 0.5 * up)
+
+
+@njit(cache=True, error_model="numpy")
+def _local_light(x: float, z: float, depth: float, camera: Array, light: Array) -> Lit:
+    dx, dz = camera[CAM_X] - x, camera[CAM_Z] - z
+    distance = max(math.sqrt(dx * dx + dz * dz), 1e-3)
+    beside = (dx * camera[CAM_COS] - dz * camera[CAM_SIN]) / (0.4 * depth + 1.0)
+    beam = light[BEAM] * math.exp(-beside * beside) / (1.0 + (depth / BEAM_REACH_M) ** 2)
+    gap = z - light[LAMP_SPACING] * math.floor(z / light[LAMP_SPACING] + 0.5)
+    pool = light[POOL] * math.exp(-((gap / LAMP_POOL_M) ** 2))
+    return dx / distance, dz / distance, beam, pool
+
+
+@njit(cache=True, error_model="numpy")
+def _hidden_side(seen_from: float, heading: float, lit: Lit) -> bool:
+    if seen_from == ANY:
+        return False
+    along = math.sin(heading) * lit[0] + math.cos(heading) * lit[1]
+    across = math.cos(heading) * lit[0] - math.sin(heading) * lit[1]
+    if seen_from == FRONT:
+        return along <= 0.0
+    if seen_from == BACK:
+        return along >= 0.0
+    return across <= 0.0 if seen_from == RIGHT else across >= 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _corners_of(
+    part: Array, x: float, z: float, heading: float, time_s: float, camera: Array, corners: Array
+) -> float:
+    """Project a frustum's eight corners; returns the depth of the last one."""
+    sine, cosine = math.sin(heading), math.cos(heading)
+    depth = 1.0
+    angle = part[PHASE] + part[RATE] * time_s
+    for level in range(2):
+        at = LOW if level == 0 else HIGH
+        right, forward, up = part[at], part[at + 1], part[at + 4]
+        if level == 0:
+            forward += part[SWING] * math.sin(angle)
+            up += part[LIFT] * max(0.0, math.cos(angle))
+        for corner in range(4):
+            r = right + (part[at + 2] if corner in (1, 2) else -part[at + 2])
+            f = forward + (part[at + 3] if corner in (2, 3) else -part[at + 3])
+            wx, wz = x + r * cosine + f * sine, z - r * sine + f * cosine
+            depth = project(wx, up, wz, camera, corners[4 * level + corner])
+    return depth
+
+
+@njit(cache=True, error_model="numpy")
+def _disc_corners(
+    part: Array, x: float, z: float, heading: float, camera: Array, corners: Array
+) -> float:
+    sine, cosine = math.sin(heading), math.cos(heading)
+    cx = x + part[LOW] * cosine + part[LOW + 1] * sine
+    cz = z - part[LOW] * sine + part[LOW + 1] * cosine
+    if part[SHAPE] == WHEEL:
+        ax, az = sine, cosine
+    else:
+        ax, az = camera[CAM_COS], -camera[CAM_SIN]
+    radius, depth = part[LOW + 2], 1.0
+    for k in range(CORNERS):
+        angle = (k + 0.5) * math.pi / 4.0
+        c, s = radius * math.cos(angle), radius * math.sin(angle)
+        depth = project(cx + c * ax, part[LOW + 4] + s, cz + c * az, camera, corners[k])
+    return depth
+
+
+@njit(cache=True, error_model="numpy")
+def _add_faces(
+    polygons: Polygons,
+    used: int,
+    part: Array,
+    heading: float,
+    camera: Array,
+    light: Array,
+    lit: Lit,
+    fade: float,
+) -> int:
+    """Paint the visible faces of the frustum whose corners lie in the scratch space."""
+    sine, cosine = math.sin(heading), math.cos(heading)
+    corners, quad = polygons.scratch[0], polygons.scratch[2]
+    for face in range(5):
+        side = (0.0, 1.0, 0.0, -1.0, 0.0)[face]
+        along = (-1.0, 0.0, 1.0, 0.0, 0.0)[face]
+        a, b = face, (face + 1) % 4
+        order = (a, b, b + 4, a + 4) if face < 4 else (4, 5, 6, 7)
+        for i in range(4):
+            quad[i, 0], quad[i, 1] = corners[order[i], 0], corners[order[i], 1]
+        if signed_area(quad, 4) >= 0.0:  # seen from inside
+            continue
+        nx, nz = side * cosine + along * sine, along * cosine - side * sine
+        shade = fade * _face_light(nx, nz, 1.0 if face == 4 else 0.0, light, lit)
+        haze = (1.0 - fade) * light[HAZE]
+        colour = part[ALBEDO] * shade + haze
+        used = _store(polygons, used, quad, 4, ATOP, colour, 0.0, 1.0, camera)
+        if part[PANE] > 0.0 and face < 4:
+            mx = 0.25 * (quad[0, 0] + quad[1, 0] + quad[2, 0] + quad[3, 0])
+            my = 0.25 * (quad[0, 1] + quad[1, 1] + quad[2, 1] + quad[3, 1])
+            for i in range(4):
+                quad[i, 0] += PANE_INSET * (mx - quad[i, 0])
+                quad[i, 1] += PANE_INSET * (my - quad[i, 1])
+            colour = part[PANE] * shade + haze
+            used = _store(polygons, used, quad, 4, ATOP, colour, 0.0, 1.0, camera)
+    return used
+
+
+@njit(cache=True, error_model="numpy")
+def _add_part(
+    polygons: Polygons,
+    used: int,
+    part: Array,
+    x: float,
+    z: float,
+    heading: float,
+    time_s: float,
+    camera: Array,
+    light: Array,
+    lit: Lit,
+    fade: float,
+) -> int:
+    corners, outline, points = polygons.scratch[0], polygons.scratch[1], polygons.scratch[3]
+    ring_px = 0.0
+    if part[SHAPE] == FRUSTUM:
+        _corners_of(part, x, z, heading, time_s, camera, corners)
+        points[:CORNERS] = corners[:CORNERS]
+        count = convex_hull(points, CORNERS, outline)
+    else:
+        depth = _disc_corners(part, x, z, heading, camera, outline)
+        ring_px = camera[FOCAL] * part[LOW + 3] / depth
+        count = CORNERS
+    if part[MODE] == SHADOW:
+        return _store(polygons, used, outline, count, SHADOW, 0.0, 0.0, part[ALBEDO], camera)
+    shade = 0.8 * _face_light(lit[0], lit[1], 0.0, light, lit)
+    colour = fade * (part[ALBEDO] * shade + part[EMIT]) + (1.0 - fade) * light[HAZE]
+    before = used
+    mode = SOLID if part[MODE] == SOLID else ATOP
+    used = _store(polygons, used, outline, count, mode, colour, ring_px, 1.0, camera)
+    if used > before and part[SHAPE] == FRUSTUM and part[PANE] >= 0.0:
+        used = _add_faces(polygons, used, part, heading, camera, light, lit, fade)
+    return used
+
+
+@njit(cache=True, error_model="numpy")
+def _grow_box(box: Array, polygons: Polygons, count: int) -> None:
+    outline = polygons.scratch[1]
+    for i in range(count):
+        box[0], box[2] = min(box[0], outline[i, 0]), max(box[2], outline[i, 0])
+        box[1], box[3] = min(box[1], outline[i, 1]), max(box[3], outline[i, 1])
+
+
+@njit(cache=True, error_model="numpy")
+def outline_actors(
+    polygons: Polygons,
+    actors: Array,
+    parts: Array,
+    first: NDArray[np.int64],
+    time_s: float,
+    camera: Array,
+    light: Array,
+) -> int:
+    """Fill `polygons` with everything that may be seen at `time_s`; returns how many there are.
+
+    Args:
+        polygons: storage, overwritten.
+        actors: actor rows, shape (n, ACTOR_COLUMNS); the sorting column is overwritten.
+        parts: part rows of all actors, one actor after the other.
+        first: index of each actor's first part, and the total, shape (n + 1,).
+        time_s: seconds since the start of the world.
+        camera: camera vector.
+        light: light vector.
+    """
+    used = 0
+    for i in range(len(actors)):
+        actor = actors[i]
+        heading = actor[HEADING]
+        x = actor[X] + actor[SPEED] * time_s * math.sin(heading)
+        z = actor[Z] + actor[SPEED] * time_s * math.cos(heading)
+        dx, dz = x - camera[CAM_X], z - camera[CAM_Z]
+        depth = dx * camera[CAM_SIN] + dz * camera[CAM_COS]
+        actor[DEPTH_SORT] = -depth
+        polygons.spans[i, 0] = used
+        box = polygons.boxes[i]
+        box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
+        if -6.0 < depth < FAR_M:
+            lit = _local_light(x, z, max(depth, 0.5), camera, light)
+            fade = math.exp(-max(depth, 0.0) / light[HAZE_REACH])
+            for p in range(first[i], first[i + 1]):
+                part = parts[p]
+                if used + 12 > len(polygons.marks) or _hidden_side(part[SEEN_FROM], heading, lit):
+                    continue
+                used = _add_part(
+                    polygons, used, part, x, z, heading, time_s, camera, light, lit, fade
+                )
+                if part[MODE] == SOLID:
+                    count = CORNERS
+                    if part[SHAPE] == FRUSTUM:
+                        count = convex_hull(polygons.scratch[3], CORNERS, polygons.scratch[1])
+                    _grow_box(box, polygons, count)
+        polygons.spans[i, 1] = used
+    polygons.order[:] = np.argsort(actors[:, DEPTH_SORT])
+    return used

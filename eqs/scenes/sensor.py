@@ -1,0 +1,236 @@
+"""The reference event camera: a pixel circuit fed with light, never with frames."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eqs.events import Events
+from eqs.scenes.circuit import Array, Circuit, advance, read_out
+
+ELECTRON_C = 1.602176634e-19
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceSensor:
+    """Parameters of the reference event camera, and nothing else.
+
+    A photodiode with dark current drives a logarithmic photoreceptor of second order whose
+    bandwidth and damping follow the photocurrent; shot noise enters ahead of it, so dim pixels
+    are slow and noisy. A change detector with mismatched thresholds compares the output with the
+    value it memorised: after each event and a refractory period it memorises the signal as it is
+    then, and what changed meanwhile is lost. Leakage in the memory brings ON events without any
+    change, in proportion to the light plus a dark part; a few hot pixels leak much faster.
+    Events wait for a row-wise readout, so they arrive late and share times along rows.
+
+    It stands in for a real sensor in the rendered world; it is not one. Its parameters come from
+    published measurements and are not tuned to results: `definition_hash` says which they were.
+
+    Args:
+        threshold_on_log: mean ON threshold, natural-log contrast.
+        threshold_off_log: mean OFF threshold, natural-log contrast, positive.
+        threshold_mismatch_log: standard deviation of a pixel's threshold over the array.
+        photocurrent_fa_per_lux: photocurrent per lux at the focal plane, fA.
+        dark_current_fa: photodiode dark current, fA.
+        amplifier_gain: voltage gain of the photoreceptor's feedback amplifier.
+        back_gate: slope factor kappa of the feedback transistor.
+        thermal_voltage_v: V_T.
+        photodiode_capacitance_ff: capacitance at the photodiode node, fF.
+        miller_capacitance_ff: capacitance between input and output of the amplifier, fF.
+        amplifier_time_us: time constant of the amplifier's output node, us.
+        shot_noise_factor: power of the shot noise relative to the photodiode's alone.
+        leak_hz: ON events per pixel and second from leakage in the dark.
+        leak_hz_per_klux: what parasitic photocurrent adds per klux at the focal plane.
+        leak_mismatch: standard deviation of the natural log of a pixel's leakage.
+        hot_pixel_fraction: share of the pixels that leak fast.
+        hot_pixel_hz: mean rate of a hot pixel's ON events; exponentially distributed.
+        refractory_us: time after an event in which the pixel is held in reset, us.
+        latency_us: delay of comparator and handshake, us.
+        jitter_us: standard deviation of that delay, us.
+        row_service_us: time the readout spends on one row, us.
+        step_us: time between two renderings of the scene, us.
+        seed: draws the fixed pattern of mismatch; one seed is one sensor.
+
+    Source: circuit and its constants as in the linear analysis of the DVS128 pixel (Lichtsteiner
+    et al. 2008) used by Low and Lee 2024; configs/scene/reference_sensor.yaml says where every
+    number comes from.
+    """
+
+    threshold_on_log: float = 0.223
+    threshold_off_log: float = 0.223
+    threshold_mismatch_log: float = 0.021
+    photocurrent_fa_per_lux: float = 90.0
+    dark_current_fa: float = 4.0
+    amplifier_gain: float = 140.0
+    back_gate: float = 0.7
+    thermal_voltage_v: float = 0.025
+    photodiode_capacitance_ff: float = 35.0
+    miller_capacitance_ff: float = 0.6
+    amplifier_time_us: float = 1815.0
+    shot_noise_factor: float = 2.0
+    leak_hz: float = 0.1
+    leak_hz_per_klux: float = 0.2
+    leak_mismatch: float = 0.4
+    hot_pixel_fraction: float = 5e-4
+    hot_pixel_hz: float = 40.0
+    refractory_us: float = 300.0
+    latency_us: float = 40.0
+    jitter_us: float = 20.0
+    row_service_us: float = 0.2
+    step_us: int = 1000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse values the circuit cannot have."""
+        for name, value in asdict(self).items():
+            if not value >= 0:
+                raise ValueError(f"Expected {name} >= 0, got {value}; set scene.sensor.{name}")
+        for name in ("threshold_on_log", "threshold_off_log", "dark_current_fa", "step_us"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"Expected {name} > 0, got 0; set scene.sensor.{name}")
+
+    def definition_hash(self) -> str:
+        """Twelve hexadecimal digits that change with any parameter."""
+        text = json.dumps(asdict(self), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+    def start(
+        self, height: int, width: int, *, noise_key: tuple[int, ...], start_us: int = 0
+    ) -> ReferenceStream:
+        """Switch the sensor on; `noise_key` names the recording and thereby its noise."""
+        return ReferenceStream(self, height, width, noise_key=noise_key, start_us=start_us)
+
+    def circuit(self) -> Circuit:
+        """The circuit's constants in seconds and lux, as the compiled code reads them."""
+        volts = self.thermal_voltage_v
+        # tau = C V_T / i, expressed for i in fA.
+        return Circuit(
+            fa_per_lux=self.photocurrent_fa_per_lux,
+            dark_fa=self.dark_current_fa,
+            input_s_fa=self.photodiode_capacitance_ff * volts,
+            miller_s_fa=self.miller_capacitance_ff * volts,
+            gain=self.amplifier_gain,
+            loop_gain=self.back_gate * self.amplifier_gain + 1.0,
+            output_s=1e-6 * self.amplifier_time_us,
+            step_s=1e-6 * self.step_us,
+            noise_fa=self.shot_noise_factor * ELECTRON_C * 1e15 / (1e-6 * self.step_us),
+            refractory_us=self.refractory_us,
+            latency_us=self.latency_us,
+            jitter_us=self.jitter_us,
+            row_service_us=self.row_service_us,
+            leak_per_lux=self.leak_hz_per_klux * 1e-3 / max(self.leak_hz, 1e-9),
+        )
+
+
+class ReferenceStream:
+    """One recording of a `ReferenceSensor`: the state of every pixel and of the readout.
+
+    Convention: picture k of a recording is the light at `start_us + k step_us`; between two
+    pictures the photoreceptor's output runs straight. Feeding the pictures one by one or in any
+    groups gives the same events.
+    """
+
+    def __init__(
+        self,
+        sensor: ReferenceSensor,
+        height: int,
+        width: int,
+        *,
+        noise_key: tuple[int, ...],
+        start_us: int,
+    ) -> None:
+        """Draw the sensor's fixed pattern; the first picture settles the pixels."""
+        self._sensor, self._circuit = sensor, sensor.circuit()
+        self._height, self._width, self._start_us = height, width, start_us
+        count = height * width
+        pattern = np.random.default_rng(np.random.SeedSequence([sensor.seed, height, width]))
+        spread = sensor.threshold_mismatch_log
+        floor = 0.2 * min(sensor.threshold_on_log, sensor.threshold_off_log)
+        means = np.array([[sensor.threshold_on_log], [sensor.threshold_off_log]])
+        thresholds = np.maximum(means + spread * pattern.standard_normal((2, count)), floor)
+        leak_hz = sensor.leak_hz * np.exp(sensor.leak_mismatch * pattern.standard_normal(count))
+        hot = pattern.random(count) < sensor.hot_pixel_fraction
+        leak_hz[hot] += pattern.exponential(sensor.hot_pixel_hz, count)[hot]
+        self._thresholds = thresholds.astype(np.float32)
+        self._leak_per_us = (1e-6 * leak_hz * sensor.threshold_on_log).astype(np.float32)
+        keys = np.random.SeedSequence([sensor.seed, *noise_key]).generate_state(2, np.uint64)
+        self._key, self._phase_seed = np.uint64(keys[0]), int(keys[1])
+        # Rows: photoreceptor output, its slope per second, memorised value, refractory us left.
+        self._state = np.zeros((4, count), np.float32)
+        self._steps = -1
+        self._pending = np.zeros((0, 4))
+        self._bus = np.array([-1.0, -1.0])  # when the readout is free, and the row it serves
+
+    def step(self, pictures: NDArray[np.float32]) -> Events:
+        """Feed pictures (n, H, W) in lux; returns the events that can no longer change.
+
+        Raises:
+            ValueError: the pictures have another size, or a value is negative or not finite.
+        """
+        if pictures.shape[1:] != (self._height, self._width):
+            raise ValueError(
+                f"Expected pictures of {self._width}x{self._height}, got shape {pictures.shape}; "
+                "start the sensor with the scene's size"
+            )
+        if not (np.isfinite(pictures).all() and (pictures >= 0).all()):
+            raise ValueError("Expected finite light >= 0 lux, got other values; check the scene")
+        found = [self._pending]
+        for picture in pictures.reshape(len(pictures), -1).astype(np.float32, copy=False):
+            if self._steps < 0:
+                self._settle(picture)
+            else:
+                found.append(self._advance(picture))
+            self._steps += 1
+        self._pending = np.concatenate(found)
+        return self._deliver(max(self._steps, 0) * float(self._sensor.step_us))
+
+    def finish(self) -> Events:
+        """The events still waiting for the readout."""
+        return self._deliver(np.inf)
+
+    def _settle(self, picture: NDArray[np.float32]) -> None:
+        circuit = self._circuit
+        self._state[0] = np.log(circuit.fa_per_lux * picture + circuit.dark_fa)
+        # Every pixel is somewhere between its thresholds when the recording begins.
+        place = np.random.default_rng(self._phase_seed).random(len(picture), dtype=np.float32)
+        on, off = self._thresholds
+        self._state[2] = self._state[0] - on + place * (on + off)
+
+    def _advance(self, picture: NDArray[np.float32]) -> Array:
+        room = 4 * len(picture)
+        while True:
+            trial, events = self._state.copy(), np.empty((room, 4))
+            count = advance(
+                trial,
+                picture,
+                self._thresholds,
+                self._leak_per_us,
+                self._circuit,
+                self._key,
+                self._steps,
+                self._width,
+                events,
+            )
+            if count <= room:
+                self._state = trial
+                return events[:count]
+            room = 2 * count
+
+    def _deliver(self, until_us: float) -> Events:
+        """Pass on the requests made before `until_us`, in the order they were made."""
+        ready = self._pending[:, 0] < until_us
+        due, self._pending = self._pending[ready], self._pending[~ready]
+        due = due[np.lexsort((due[:, 1], due[:, 2], due[:, 0]))]
+        times = read_out(due, self._bus, self._circuit.row_service_us)
+        return Events(
+            t=times + np.int64(self._start_us),
+            x=due[:, 1].astype(np.uint16),
+            y=due[:, 2].astype(np.uint16),
+            p=due[:, 3].astype(np.uint8),
+            height=self._height,
+            width=self._width,
+        )

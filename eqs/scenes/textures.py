@@ -1,0 +1,167 @@
+"""Textures of the procedural street: building fronts and ground, as maps of radiance in lux."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Map = NDArray[np.floating]
+Mask = NDArray[np.bool_]
+
+PERIOD_M: Final = 96.0
+FRONT_M: Final = 16.0
+FLOOR_M: Final = 3.2
+HALF_STREET_M: Final = 10.0
+KERB_M: Final = 6.2
+LAMP_SPACING_M: Final = 24.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lighting:
+    """Where the light in the street comes from.
+
+    Args:
+        ambient_lux: illuminance of a white surface at the focal plane without sun or lamps.
+        sun_lux: what direct sun adds.
+        sun_side: -1 if the sun shines on the left fronts, 1 on the right ones.
+        lamp_lux: what a street lamp adds in the middle of its pool; zero by day.
+        window_lux: radiance of a lit window; zero by day.
+    """
+
+    ambient_lux: float
+    sun_lux: float
+    sun_side: float
+    lamp_lux: float
+    window_lux: float
+
+
+def integrate(texture: Map) -> Map:
+    """Summed-area table with a leading row and column of zeros."""
+    table = np.zeros((texture.shape[0] + 1, texture.shape[1] + 1))
+    table[1:, 1:] = texture.cumsum(0).cumsum(1)
+    return table
+
+
+def mottle(rng: np.random.Generator, shape: tuple[int, int], texel_m: float, depth: float) -> Map:
+    """Factor around one with structure at several sizes, periodic along the second axis."""
+    total = np.zeros(shape)
+    for size_m, weight in ((0.25, 0.7), (0.8, 0.8), (2.4, 0.6)):
+        step = max(1, round(size_m / texel_m))
+        coarse = rng.standard_normal((-(-shape[0] // step), -(-shape[1] // step)))
+        total += weight * np.kron(coarse, np.ones((step, step)))[: shape[0], : shape[1]]
+    return np.exp(depth * total)
+
+
+def lamp_pools(texel_m: float, length: int) -> Map:
+    """Relative light of the street lamps along z, shape (length,)."""
+    z = (np.arange(length) + 0.5) * texel_m
+    gap = z - LAMP_SPACING_M * np.round(z / LAMP_SPACING_M)
+    return np.exp(-((gap / 7.0) ** 2))
+
+
+def _paint_windows(
+    rng: np.random.Generator,
+    albedo: Map,
+    glow: Map,
+    columns: slice,
+    texel_m: float,
+    roof_m: float,
+    lit: float,
+) -> None:
+    """Add a grid of windows, some of them lit, to one building."""
+    pitch = rng.uniform(1.8, 3.2)
+    wide, tall = rng.uniform(0.45, 0.65) * pitch, rng.uniform(1.3, 2.0)
+    sill = rng.uniform(0.7, 1.1)
+    first, last = columns.start * texel_m, columns.stop * texel_m
+    glass = rng.uniform(0.03, 0.08)
+    for floor in range(int(roof_m / FLOOR_M)):
+        shop = floor == 0 and rng.random() < 0.6
+        bottom = 0.5 if shop else floor * FLOOR_M + sill
+        y = slice(round(bottom / texel_m), round((bottom + (2.2 if shop else tall)) / texel_m))
+        at = first + 0.4
+        while at + wide < last - 0.3:
+            z = slice(round(at / texel_m), round((at + wide) / texel_m))
+            albedo[y, z] = rng.uniform(0.3, 0.7) if rng.random() < 0.25 else glass
+            if rng.random() < (0.7 if shop else 0.3):
+                glow[y, z] = lit * rng.uniform(0.2, 1.0) * (1.5 if shop else 1.0)
+            at += pitch
+        ledge = round(floor * FLOOR_M / texel_m)
+        albedo[ledge : ledge + max(1, round(0.2 / texel_m)), columns] *= rng.choice([0.4, 1.7])
+
+
+def front(
+    rng: np.random.Generator, lighting: Lighting, side: float, texel_m: float
+) -> tuple[Map, Map]:
+    """One side of the street.
+
+    Returns:
+        Radiance over (height, z) and roof height over z, in texels of `texel_m`.
+    """
+    length, rows = round(PERIOD_M / texel_m), round(FRONT_M / texel_m)
+    albedo, glow = np.full((rows, length), 0.3), np.zeros((rows, length))
+    roofs = np.zeros(length)
+    start = 0
+    while start < length:
+        stop = min(length, start + round(rng.uniform(6.0, 16.0) / texel_m))
+        if length - stop < round(4.0 / texel_m):
+            stop = length
+        columns = slice(start, stop)
+        if rng.random() < 0.14:  # a garden wall or hedge between two buildings
+            roof = rng.uniform(2.0, 3.5)
+            albedo[:, columns] = rng.uniform(0.05, 0.12)
+        else:
+            roof = rng.uniform(6.5, FRONT_M - 1.0)
+            albedo[:, columns] = np.exp(rng.uniform(np.log(0.12), np.log(0.65)))
+            _paint_windows(rng, albedo, glow, columns, texel_m, roof, lighting.window_lux)
+        roofs[columns] = roof
+        edge = max(1, round(0.25 / texel_m))
+        albedo[:, start : start + edge] *= 0.45
+        start = stop
+    albedo *= mottle(rng, albedo.shape, texel_m, 0.16)
+    height = (np.arange(rows)[:, None] + 0.5) * texel_m
+    light = np.full(albedo.shape, lighting.ambient_lux)
+    light += lighting.sun_lux * 0.7 * (side == lighting.sun_side)
+    light += lighting.lamp_lux * 0.6 * lamp_pools(texel_m, length) * np.exp(-((height / 6.0) ** 2))
+    return albedo * light + glow, roofs
+
+
+def _markings(rng: np.random.Generator, x: Map, z: Map) -> tuple[Mask, Mask]:
+    """Where there is white paint, and where a dark line, on the ground."""
+    dashed = (np.abs(x) < 0.12) & (np.mod(z, 6.0) < 3.0)
+    parking = (np.abs(np.abs(x) - 4.1) < 0.11) & (np.mod(z, 6.2) < 5.2)
+    crossing_z = rng.uniform(0.0, PERIOD_M - 4.0, size=2)
+    zebra = np.zeros(np.broadcast_shapes(x.shape, z.shape), bool)
+    for at in crossing_z:
+        zebra |= (z > at) & (z < at + 3.5) & (np.abs(x) < 5.9) & (np.mod(x, 1.0) < 0.5)
+    kerb = np.abs(np.abs(x) - KERB_M) < 0.14
+    slab = (np.abs(x) > KERB_M) & ((np.mod(z, 1.5) < 0.14) | (np.mod(np.abs(x), 1.25) < 0.13))
+    return dashed | parking | zebra | kerb, slab
+
+
+def ground(
+    rng: np.random.Generator, lighting: Lighting, texel_m: float, roofs: tuple[Map, Map]
+) -> Map:
+    """Road and pavements, radiance over (x, z)."""
+    length, rows = round(PERIOD_M / texel_m), round(2.0 * HALF_STREET_M / texel_m)
+    x = ((np.arange(rows) + 0.5) * texel_m - HALF_STREET_M)[:, None]
+    z = ((np.arange(length) + 0.5) * texel_m)[None]
+    asphalt, paving = rng.uniform(0.07, 0.13), rng.uniform(0.2, 0.32)
+    albedo = np.where(np.abs(x) < KERB_M, asphalt, paving) * np.ones_like(z)
+    albedo *= mottle(rng, albedo.shape, texel_m, 0.20)
+    white, dark = _markings(rng, x, z)
+    albedo[dark] *= 0.45
+    for _ in range(40):  # patches, manholes and tar seams
+        at_x, at_z = rng.uniform(-KERB_M, KERB_M), rng.uniform(1.0, PERIOD_M - 1.0)
+        long_x, long_z = np.exp(rng.uniform(np.log(0.15), np.log(1.2), size=2))
+        inside = (np.abs(x - at_x) < long_x) & (np.abs(z - at_z) < 2.0 * long_z)
+        albedo[inside] *= rng.choice([0.5, 0.65, 1.5])
+    albedo[white] = 0.55 * mottle(rng, albedo.shape, texel_m, 0.08)[white]
+    # The sunny side's houses do not shade the road, those of the other side do.
+    shading = roofs[0] if lighting.sun_side > 0 else roofs[1]
+    edge = -HALF_STREET_M + 0.95 * shading[None]
+    sunny = (x * np.sign(lighting.sun_side)) > edge
+    light = lighting.ambient_lux + lighting.sun_lux * sunny
+    return albedo * (light + lighting.lamp_lux * lamp_pools(texel_m, length)[None])
