@@ -2,6 +2,14 @@
 
 from eqs.study.answer import answer
 from eqs.study.console import print_eqs, print_study
+from eqs.study.correlation import (
+    TARGETS,
+    Correlation,
+    Target,
+    correlate,
+    correlations,
+    write_correlations,
+)
 from eqs.study.figures import (
     accuracy_bars,
     event_rate,
@@ -12,14 +20,6 @@ from eqs.study.figures import (
 from eqs.study.pictures import Boxes, detection_panels, event_image, events_panels, score_maps
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
-from eqs.study.statistics import (
-    TARGETS,
-    Correlation,
-    Target,
-    correlate,
-    correlations,
-    write_correlations,
-)
 from eqs.study.style import FIGURE_TEXTS, report_figure, save_figure
 from eqs.study.tables import (
     REFERENCE,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from eqs.study.statistics import SIMULATORS_NEEDED, Correlation
+from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.tables import (
     RATIO_FLOOR,
     REFERENCE,

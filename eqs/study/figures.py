@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from eqs.events import Events
-from eqs.study.statistics import SIMULATORS_NEEDED, Correlation
+from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.style import MARKERS, STYLE, colours, figure
 from eqs.study.tables import REFERENCE, simulated, summarise_eqs, summarise_study
 
@@ -126,53 +126,46 @@ def _verdict(result: Correlation | None) -> str:
 def accuracy_bars(study: pd.DataFrame) -> Figure:
     """Simulated and real mAP of every system side by side, times 100."""
     systems = summarise_study(study)
-    colour = colours(systems["system"])
-    place = np.arange(len(systems))
-    sides = (("map_sim", -0.2, 0.45, "simulated"), ("map_real", 0.2, 1.0, "real"))
+    sides = (
+        ("map_sim", -0.2, 0.45, "tested on its simulated events"),
+        ("map_real", 0.2, 1.0, "tested on real events"),
+    )
     with mpl.rc_context({**STYLE, "axes.grid.axis": "y"}):
         drawing = figure(max(5.0, 1.6 * len(systems) + 1), 3.8)
         axes = drawing.subplots()
         for column, shift, alpha, _ in sides:
-            heights = 100 * systems[column].to_numpy(dtype=float)
-            if column == "map_sim":  # the reference has one test set, not two
-                heights = np.where(systems["simulator"] == REFERENCE, np.nan, heights)
-            bars = axes.bar(
-                place + shift,
-                heights,
-                0.38,
-                color=[colour[name] for name in systems["system"]],
-                alpha=alpha,
-            )
-            spread = 100 * systems[f"{column}_sd"].to_numpy(dtype=float)
-            known = np.isfinite(spread) & np.isfinite(heights)
-            axes.errorbar(
-                (place + shift)[known],
-                heights[known],
-                yerr=spread[known],
-                fmt="none",
-                ecolor="#333333",
-                capsize=3,
-            )
-            texts = [f"{height:.1f}" if np.isfinite(height) else "" for height in heights]
-            axes.bar_label(bars, labels=texts, padding=4)
+            _bars(axes, systems, column, shift, alpha)
         names = [
             "real events\n(no simulator)" if row["simulator"] == REFERENCE else row["system"]
             for _, row in systems.iterrows()
         ]
-        axes.set_xticks(place, names)
+        axes.set_xticks(np.arange(len(systems)), names)
         axes.set(ylabel="mAP (higher is better)", xlabel="detector trained on")
         axes.margins(y=0.15)
         keys = [
             Line2D([], [], marker="s", markersize=9, linestyle="", color="#555555", alpha=alpha)
             for _, _, alpha, _ in sides
         ]
-        drawing.legend(
-            keys,
-            ["tested on its simulated events", "tested on real events"],
-            loc="outside upper left",
-            ncols=2,
-        )
+        drawing.legend(keys, [words for *_, words in sides], loc="outside upper left", ncols=2)
     return drawing
+
+
+def _bars(axes: Axes, systems: pd.DataFrame, column: str, shift: float, alpha: float) -> None:
+    colour = colours(systems["system"])
+    place = np.arange(len(systems)) + shift
+    heights = 100 * systems[column].to_numpy(dtype=float)
+    if column == "map_sim":  # the reference has one test set, not two
+        heights = np.where(systems["simulator"] == REFERENCE, np.nan, heights)
+    bars = axes.bar(
+        place, heights, 0.38, color=[colour[name] for name in systems["system"]], alpha=alpha
+    )
+    spread = 100 * systems[f"{column}_sd"].to_numpy(dtype=float)
+    known = np.isfinite(spread) & np.isfinite(heights)
+    axes.errorbar(
+        place[known], heights[known], yerr=spread[known], fmt="none", ecolor="#333333", capsize=3
+    )
+    texts = [f"{height:.1f}" if np.isfinite(height) else "" for height in heights]
+    axes.bar_label(bars, labels=texts, padding=4)
 
 
 def sequence_dots(eqs: pd.DataFrame) -> Figure:

@@ -12,6 +12,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from eqs.study.answer import answer
+from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.layout import (
     Table,
     accuracy_table,
@@ -21,7 +22,6 @@ from eqs.study.layout import (
     summary_table,
 )
 from eqs.study.printed import ACCURACY_TABLE, SCORES_TABLE
-from eqs.study.statistics import SIMULATORS_NEEDED, Correlation
 from eqs.study.tables import RATIO_FLOOR, REFERENCE, summarise_study, write_text
 
 MEDIA_TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
