@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +88,11 @@ class FrameFolder:
         """Number of frames."""
         return len(self.paths)
 
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of a frame, `(H, W)` grey or `(H, W, 3)` RGB, as the first image has it."""
+        return read_image(self.paths[0]).shape
+
     def read(self, start: int, stop: int) -> NDArray[np.uint8]:
         """Frames `[start, stop)` as one array.
 
@@ -95,10 +101,10 @@ class FrameFolder:
         """
         frames = [read_image(path) for path in self.paths[start:stop]]
         for path, frame in zip(self.paths[start:stop], frames, strict=True):
-            if frame.shape != frames[0].shape:
+            if frame.shape != self.shape:
                 raise ValueError(
                     f"Expected frames of one size, got {frame.shape} in {path} after "
-                    f"{frames[0].shape}; a clip is all grey or all RGB, of one height and width"
+                    f"{self.shape}; a clip is all grey or all RGB, of one height and width"
                 )
         return np.stack(frames)
 

@@ -1,0 +1,87 @@
+"""The parameter files mirror the parameters, and every preset composes."""
+
+from dataclasses import fields
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import yaml
+from hydra import compose, initialize_config_dir
+from hydra.utils import instantiate
+
+from eqs.simulators import ESIM, PIX2NVS, V2E, Recorded
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+SIMULATORS = {"esim": ESIM, "v2e": V2E, "pix2nvs": PIX2NVS, "real": Recorded}
+PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
+
+CHANGED = ("esim_noisy", "v2e_paper", "v2e_clean", "v2e_noisy")
+
+
+def composed(tmp_path, *overrides):
+    """What a program gets whose defaults name a simulator and a preset."""
+    (tmp_path / "main.yaml").write_text(
+        "defaults: [_self_, {sim: esim}, {preset: default}, {sim_preset: '${sim}_${preset}'}]\n"
+        f"hydra: {{searchpath: ['file://{CONFIGS}']}}\nseed: 7\n"
+    )
+    with initialize_config_dir(str(tmp_path), version_base=None):
+        return compose("main", overrides=list(overrides))
+
+
+@pytest.mark.parametrize("name", SIMULATORS)
+def test_a_parameter_file_has_exactly_the_defaults(name):
+    kind = SIMULATORS[name]
+    values = yaml.safe_load((CONFIGS / "sim" / f"{name}.yaml").read_text())
+    assert values.pop("_target_") == f"eqs.simulators.{kind.__name__}"
+    assert kind.name == name
+    expected = {field.name: field.default for field in fields(kind)}
+    if "seed" in expected:
+        expected["seed"] = "${seed}"
+    assert values == expected
+    assert {key: type(value) for key, value in values.items()} == {
+        key: type(value) for key, value in expected.items()
+    }
+
+
+@pytest.mark.parametrize("name", SIMULATORS)
+def test_every_parameter_has_a_comment_with_source_and_range(name):
+    lines = (CONFIGS / "sim" / f"{name}.yaml").read_text().splitlines()
+    for above, line in pairwise(lines):
+        if not line.startswith(("#", "_target_", "mode", "seed")):
+            assert above.startswith("# "), line
+            assert "Source: " in above, line
+            assert any(word in above for word in ("Typical ", "Range ", "One of ")), line
+
+
+def test_every_simulator_has_a_parameter_file():
+    assert {path.stem for path in (CONFIGS / "sim").glob("*.yaml")} == set(SIMULATORS)
+
+
+@pytest.mark.parametrize("pair", PRESETS)
+def test_every_preset_composes_and_builds(tmp_path, pair):
+    name, preset = pair.split("_")
+    config = composed(tmp_path, f"sim={name}", f"preset={preset}")
+    simulator = instantiate(config.sim)
+    assert simulator.name == name
+    defaults = instantiate(composed(tmp_path, f"sim={name}").sim)
+    assert (simulator == defaults) == (pair not in CHANGED)
+
+
+def test_every_simulator_has_default_and_paper():
+    assert {f"{name}_{preset}" for name in SIMULATORS for preset in ("default", "paper")} <= set(
+        PRESETS
+    )
+    words = {path.stem for path in (CONFIGS / "preset").glob("*.yaml")}
+    assert {pair.split("_")[1] for pair in PRESETS} == words
+
+
+def test_the_paper_preset_states_the_papers_thresholds(tmp_path):
+    simulator = instantiate(composed(tmp_path, "sim=v2e", "preset=paper").sim)
+    assert (simulator.threshold_on_log, simulator.threshold_off_log) == (0.3, 0.3)
+    assert simulator.threshold_sigma_log == 0.03
+    assert simulator.seed == 7
+
+
+def test_the_command_line_overrides_a_preset(tmp_path):
+    config = composed(tmp_path, "sim=v2e", "preset=paper", "sim.threshold_on_log=0.25")
+    assert instantiate(config.sim).threshold_on_log == 0.25
