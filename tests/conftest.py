@@ -86,19 +86,19 @@ def write_recording(
     return folder
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_events():
     """`random_events` as a fixture."""
     return random_events
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_tracks():
     """`tracks_of` as a fixture."""
     return tracks_of
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_recording():
     """`write_recording` as a fixture."""
     return write_recording

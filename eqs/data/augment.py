@@ -150,4 +150,4 @@ def _resized(frames: NDArray[np.uint8], height: int, width: int) -> NDArray[np.u
         (2 * np.arange(wanted) + 1) * given // (2 * wanted)
         for wanted, given in zip((height, width), frames.shape[-2:], strict=True)
     )
-    return frames[..., rows[:, None], columns]
+    return frames.take(rows, axis=-2).take(columns, axis=-1)

@@ -43,10 +43,10 @@ class StepSampler(Sampler[int]):
     a training resumed at an epoch's start goes on exactly as one that was never interrupted.
     """
 
-    def __init__(self, steps: int) -> None:
-        """Start with epoch 0."""
+    def __init__(self, steps: int, epoch: int = 0) -> None:
+        """Start with the given epoch."""
         self.steps = steps
-        self.epoch = 0
+        self.epoch = epoch
 
     def set_epoch(self, epoch: int) -> None:
         """Choose the epoch; the trainer calls this before each one."""
@@ -153,9 +153,10 @@ class EventDataModule(lightning.LightningDataModule):
 
     def train_dataloader(self) -> DataLoader[Batch]:
         """The batches of one epoch."""
-        return self._loader(
-            self.training_dataset(*self._process()), StepSampler(self.steps_per_epoch)
-        )
+        # A resumed trainer takes its first batch before it names the epoch.
+        done = self.trainer.fit_loop.total_batch_idx + 1 if self.trainer else 0
+        sampler = StepSampler(self.steps_per_epoch, epoch=done // self.steps_per_epoch)
+        return self._loader(self.training_dataset(*self._process()), sampler)
 
     def val_dataloader(self) -> DataLoader[Batch]:
         """The validation recordings with the events that the training uses."""
