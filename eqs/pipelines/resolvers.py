@@ -19,4 +19,5 @@ def precision(device: str) -> str:
 def register_resolvers() -> None:
     """Make the resolvers known to OmegaConf; may be called again."""
     OmegaConf.register_new_resolver("precision", precision, replace=True)
+    OmegaConf.register_new_resolver("length", len, replace=True)
     OmegaConf.register_new_resolver("multiply", lambda a, b: a * b, replace=True)

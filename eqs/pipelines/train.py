@@ -18,6 +18,7 @@ from eqs.data import EventSource, RecordedEvents
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.runs import Run, recipe_hash
+from eqs.files import short_hash
 from eqs.pipelines.timing import PhaseTimes
 from eqs.tasks import DetectionTask
 
@@ -71,7 +72,7 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
 
 def build_task(cfg: DictConfig, protocol: Any, test_streams: list[str]) -> DetectionTask:
     """The configured detector in its training module."""
-    model = instantiate(cfg.model, num_classes=len(protocol.class_names))
+    model = instantiate(cfg.model)
     return instantiate(cfg.task)(
         model=model, class_names=protocol.class_names, test_streams=test_streams
     )
@@ -109,18 +110,31 @@ def describe(
     seconds: float,
 ) -> dict[str, Any]:
     """The record of a finished run; where the stream is the real one, it is its own test."""
-    real = {name.removeprefix("test/real/"): v for name, v in values.items() if "/real/" in name}
-    own = {name.removeprefix("test/own/"): v for name, v in values.items() if "/own/" in name}
+    real = test_values(values, "real")
     return {
-        "simulator": source.label.split("-")[0],
+        "simulator": source.name,
         "system": source.label,
         "seed": cfg.seed,
         "recipe": recipe_hash(cfg),
-        "own": own or real,
+        "own": test_values(values, "own") or real,
         "real": real,
-        "protocol": card,
+        "protocol": {**card, "hash": short_hash(card)},
         "seconds": round(seconds, 1),
     }
+
+
+def test_values(values: dict[str, float], stream: str) -> dict[str, Any]:
+    """What was measured on one test stream, the values of classes nested by kind."""
+    nested: dict[str, Any] = {}
+    for name, value in values.items():
+        kind, _, label = name.removeprefix(f"test/{stream}/").partition("/")
+        if not name.startswith(f"test/{stream}/"):
+            continue
+        if label:
+            nested.setdefault(kind, {})[label] = value
+        else:
+            nested[kind] = value
+    return nested
 
 
 def show(result: dict[str, Any]) -> None:

@@ -12,7 +12,14 @@ from torch.optim import Optimizer
 from torch.optim.lr_scheduler import LRScheduler
 
 from eqs.metrics import MeanAveragePrecision
-from eqs.models import RVTDetector, States, detach_states, postprocess, reset_states
+from eqs.models import (
+    RVTDetector,
+    States,
+    detach_states,
+    gather_frames,
+    postprocess,
+    reset_states,
+)
 
 Batch = dict[str, Tensor]
 
@@ -51,11 +58,12 @@ class DetectionTask(lightning.LightningModule):
         self.make_optimizer = optimizer
         self.make_scheduler = scheduler
         self.thresholds = (confidence_threshold, nms_threshold)
+        self.class_names = list(class_names)
         self.test_streams = list(test_streams)
 
         def precision_metric() -> MeanAveragePrecision:
             return MeanAveragePrecision(
-                class_names=class_names, drop_empty_frames=drop_empty_frames
+                num_classes=len(class_names), drop_empty_frames=drop_empty_frames
             )
 
         self.val_precision = precision_metric()
@@ -69,7 +77,7 @@ class DetectionTask(lightning.LightningModule):
         maps, states = self.model.backbone.forward_sequence(batch["histograms"].float(), states)
         self._train_states = detach_states(states)
         labelled = batch["labelled"]
-        losses = self.model.loss([stage[labelled] for stage in maps], batch["labels"][labelled])
+        losses = self.model.loss(gather_frames(maps, labelled), batch["labels"][labelled])
         self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
         self.log("loss", losses["loss"].detach(), prog_bar=True, logger=False)
         return losses["loss"]
@@ -104,7 +112,7 @@ class DetectionTask(lightning.LightningModule):
         labelled = batch["labelled"]
         if not labelled.any():
             return []
-        predictions = self.model.detect([stage[labelled] for stage in maps])
+        predictions = self.model.detect(gather_frames(maps, labelled))
         confidence, overlap = self.thresholds
         return postprocess(predictions.float(), confidence, overlap)
 
@@ -118,8 +126,11 @@ class DetectionTask(lightning.LightningModule):
         values = metric.compute()
         metric.reset()
         self._evaluation_states = None
-        scalars = {key: value for key, value in values.items() if value.ndim == 0}
-        self.log_dict({f"{prefix}/{key}": value.float() for key, value in scalars.items()})
+        scalars = {key: value for key, value in values.items() if key.startswith("map") and not value.ndim}
+        for key in ("map_per_class", "map_50_per_class", "ground_truths_per_class"):
+            pairs = zip(self.class_names, values[key], strict=True)
+            scalars |= {f"{key}/{name}": value.float() for name, value in pairs}
+        self.log_dict({f"{prefix}/{key}": value for key, value in scalars.items()})
 
     def configure_optimizers(self) -> dict[str, Any]:
         """Optimizer with a schedule that moves once per batch."""

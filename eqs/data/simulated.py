@@ -1,0 +1,163 @@
+"""Where the events of a recording come from: its own file, or a simulator fed with its frames."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from rich.progress import track
+
+from eqs.data.recording import Recording
+from eqs.events.store import EventWriter
+from eqs.files import file_sha256, read_json, short_hash, write_json
+from eqs.frames import FrameFolder
+from eqs.simulators import Simulator
+
+log = logging.getLogger(__name__)
+
+
+class EventSource(Protocol):
+    """Gives the event file of a recording."""
+
+    @property
+    def name(self) -> str:
+        """The simulator's name, or `real`."""
+
+    @property
+    def label(self) -> str:
+        """Name of this very stream: differs whenever the events could differ."""
+
+    def prepare(self, recordings: Sequence[Recording]) -> None:
+        """Make every file that `path` will name."""
+
+    def path(self, recording: Recording) -> Path:
+        """The DSEC HDF5 file with the recording's events."""
+
+
+@dataclass(frozen=True)
+class RecordedEvents:
+    """The events that the sensor itself recorded."""
+
+    name: str = "real"
+    label: str = "real"
+
+    def prepare(self, recordings: Sequence[Recording]) -> None:
+        """Nothing to make: the files came with the recordings."""
+
+    def path(self, recording: Recording) -> Path:
+        """The recording's own event file."""
+        return recording.events_path
+
+
+@dataclass(frozen=True)
+class SimulatedEvents:
+    """Events simulated from a recording's frames, written once and reused.
+
+    A stream is reused only while the simulator's parameters and version and the frames are the
+    same; anything else makes a new stream in a folder of its own.
+
+    Args:
+        simulator: the simulator with its parameters.
+        root: folder for simulated streams of one data set.
+        workers: processes that simulate side by side.
+    """
+
+    simulator: Simulator
+    root: Path
+    workers: int = os.cpu_count() or 1
+
+    @property
+    def name(self) -> str:
+        """The simulator's name."""
+        return self.simulator.name
+
+    @property
+    def label(self) -> str:
+        """Name and parameter hash, unique for what would be simulated."""
+        return f"{self.simulator.name}-{short_hash(self.simulator.parameters())}"
+
+    def path(self, recording: Recording) -> Path:
+        """Where the recording's simulated events lie, in DSEC layout."""
+        return self._folder(recording) / "events" / "left" / "events.h5"
+
+    def prepare(self, recordings: Sequence[Recording]) -> None:
+        """Simulate the recordings that are missing or whose frames changed.
+
+        Raises:
+            ValueError: a recording has no frames.
+        """
+        missing = [recording for recording in recordings if not self._is_current(recording)]
+        if not missing:
+            return
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(min(self.workers, len(missing)), mp_context=context) as pool:
+            jobs = [pool.submit(self.simulate, recording) for recording in missing]
+            description = f"simulating {self.simulator.name}"
+            for job in track(as_completed(jobs), description=description, total=len(jobs)):
+                job.result()
+
+    def simulate(self, recording: Recording) -> None:
+        """Write one recording's events and the manifest that says what they are."""
+        path = self.path(recording)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        stream = self.simulator.start(recording.name)
+        frames = FrameFolder(recording.frame_folder, recording.frame_times_us)
+        with EventWriter(
+            path,
+            height=recording.height,
+            width=recording.width,
+            t_offset_us=int(recording.frame_times_us[0]),
+        ) as writer:
+            count = 0
+            for images, times_us in frames:
+                events = stream.step(images, times_us)
+                writer.append(events)
+                count += len(events)
+            rest = stream.finish()
+            writer.append(rest)
+        write_json(
+            self._manifest_path(recording),
+            {
+                "simulator": self.simulator.name,
+                "parameters": self.simulator.parameters(),
+                "version": self.simulator.version,
+                "recording": recording.name,
+                "frames": frame_fingerprint(recording),
+                "frames_sha256": short_hash([file_sha256(file) for file in recording.frame_paths]),
+                "events": count + len(rest),
+            },
+        )
+
+    def _folder(self, recording: Recording) -> Path:
+        return self.root / self.label / recording.name
+
+    def _manifest_path(self, recording: Recording) -> Path:
+        return self._folder(recording) / "manifest.json"
+
+    def _is_current(self, recording: Recording) -> bool:
+        manifest = self._manifest_path(recording)
+        if not manifest.exists() or not self.path(recording).exists():
+            return False
+        stored = read_json(manifest)
+        expected = (
+            self.simulator.parameters(),
+            self.simulator.version,
+            frame_fingerprint(recording),
+        )
+        return (stored["parameters"], stored["version"], stored["frames"]) == expected
+
+
+def frame_fingerprint(recording: Recording) -> str:
+    """Hash of the frames' times, names and sizes: cheap enough to ask before every use."""
+    return short_hash([recording.frame_times_us.tolist(), list(_sizes(recording.frame_paths))])
+
+
+def _sizes(paths: Iterable[Path]) -> Iterable[tuple[str, int]]:
+    for path in paths:
+        yield path.name, path.stat().st_size

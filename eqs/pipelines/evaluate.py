@@ -1,0 +1,129 @@
+"""Tabulate finished runs; on request, score the simulators and write the study's results."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig
+from rich.console import Console
+
+from eqs.data import EventSource
+from eqs.pipelines.build import dataset, event_source
+from eqs.pipelines.command import explained
+from eqs.pipelines.judge import find_judge
+from eqs.pipelines.publish import Findings, publish
+from eqs.pipelines.runs import Run, finished_runs, recipe_hash
+from eqs.pipelines.score import score_recordings
+from eqs.pipelines.timing import PhaseTimes
+from eqs.study import eqs_table, print_eqs, print_study, study_table, write_table
+
+log = logging.getLogger(__name__)
+
+
+@explained
+def evaluate(cfg: DictConfig) -> None:
+    """Print the mAPs of all finished runs and, with `score`, do the rest of the study.
+
+    Raises:
+        ValueError: there is neither a finished run nor anything to score.
+    """
+    console = Console()
+    results = Path(cfg.paths.results) / cfg.data.name
+    runs = comparable_runs(cfg)
+    if runs:
+        study = study_table(study_rows(runs))
+        write_table(study, results / "study.csv")
+        print_study(study, console)
+    elif not cfg.score:
+        raise ValueError(
+            f"Expected a finished run on {cfg.data.name} with this recipe, got none; "
+            "type `python train.py sim=esim` first, or repeat the overrides of the training"
+        )
+    if cfg.score:
+        score(cfg, runs, results, console)
+
+
+def comparable_runs(cfg: DictConfig) -> list[Run]:
+    """The finished runs that followed the configured recipe; others are named and left out."""
+    recipe = recipe_hash(cfg)
+    found = list(finished_runs(Path(cfg.paths.runs) / cfg.data.name))
+    kept = [run for run in found if run.result()["recipe"] == recipe]
+    if len(kept) < len(found):
+        others = Counter(run.result()["recipe"] for run in found if run not in kept)
+        log.info("left out %d run(s) of other recipes: %s", others.total(), ", ".join(others))
+    return kept
+
+
+def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """One row per run, as `study.csv` wants it."""
+    names = short_names([(run.result()["simulator"], run.result()["system"]) for run in runs])
+    rows = []
+    for run in runs:
+        result = run.result()
+        own, real = result["own"], result["real"]
+        rows.append(
+            {
+                "simulator": result["simulator"],
+                "system": names[result["system"]],
+                "seed": result["seed"],
+                "map_sim": own["map"],
+                "map50_sim": own["map_50"],
+                "map_real": real["map"],
+                "map50_real": real["map_50"],
+                **{f"ap_sim_{name}": value for name, value in own["map_per_class"].items()},
+                **{f"ap_real_{name}": value for name, value in real["map_per_class"].items()},
+                "protocol": result["protocol"]["hash"],
+                "recipe": result["recipe"],
+            }
+        )
+    return rows
+
+
+def short_names(systems: Sequence[tuple[str, str]]) -> dict[str, str]:
+    """What to call each system: its simulator's name, or its label where settings compete."""
+    settings = Counter(name for name, _ in set(systems))
+    return {label: name if settings[name] == 1 else label for name, label in systems}
+
+
+def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console) -> None:
+    """Score all systems, write every table and figure and the report."""
+    times = PhaseTimes(Path(cfg.paths.runs) / cfg.data.name / "timings.json")
+    data = dataset(cfg)
+    recordings = data.recordings("test")
+    systems = scored_systems(cfg, runs)
+    for source in systems.values():
+        source.prepare(recordings)
+    judge = find_judge(cfg)
+    with times.measure("score"):
+        scores = score_recordings(judge, recordings, systems)
+    table = eqs_table(scores.rows)
+    names = short_names([(run.result()["simulator"], run.result()["system"]) for run in runs])
+    found = Findings(
+        recordings=recordings,
+        judge=judge,
+        systems=systems,
+        runs={names[run.result()["system"]]: run for run in runs},
+        scores=scores,
+        eqs=table,
+        study=study_table(study_rows(runs), table) if runs else None,
+    )
+    print_eqs(table, console)
+    with times.measure("report"):
+        publish(cfg, results, data, found, times.read())
+    console.print(f"[bold]judge[/bold]: {judge.description} ({judge.weights_sha256[:12]})")
+    console.print(f"[bold]report[/bold]: {results / 'report.html'}")
+    for phase, seconds in times.read().items():
+        console.print(f"  {phase:<24}{seconds:8.1f} s")
+
+
+def scored_systems(cfg: DictConfig, runs: Sequence[Run]) -> Mapping[str, EventSource]:
+    """Configured simulators and those of the finished runs, by the name used in the tables."""
+    configured = [event_source(simulator, cfg) for simulator in cfg.simulators.values()]
+    trained = [event_source(run.config().sim, cfg) for run in runs]
+    sources = {s.label: s for s in [*configured, *trained] if s.name != "real"}
+    names = short_names([(source.name, label) for label, source in sources.items()])
+    return {names[label]: source for label, source in sources.items()}

@@ -1,0 +1,180 @@
+"""Write what a study found: tables, figures, the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+
+from eqs.data import EventSource, LabelProtocol, RecordedEvents, Recording
+from eqs.pipelines.judge import Judge
+from eqs.pipelines.runs import Run
+from eqs.pipelines.score import Scores
+from eqs.pipelines.showcase import RATE_SPAN_US, WINDOW_US, around, choose, detections
+from eqs.study import (
+    Correlation,
+    ReportContent,
+    ReportFigure,
+    accuracy_bars,
+    correlations,
+    detection_panels,
+    event_rate,
+    events_panels,
+    rate_curves,
+    report_figure,
+    score_against_accuracy,
+    score_maps,
+    sequence_dots,
+    write_correlations,
+    write_report,
+    write_table,
+)
+
+RATE_BIN_US = 5_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """Everything a study found, before it is written down.
+
+    Args:
+        recordings: the scored recordings.
+        judge: what scored them.
+        systems: the scored systems by the name used in the tables.
+        runs: the finished run of each trained system, by the name used in the tables.
+        scores: maps and anchors.
+        eqs: one row per (system, recording).
+        study: one row per (system, seed), if anything was trained.
+    """
+
+    recordings: Sequence[Recording]
+    judge: Judge
+    systems: Mapping[str, EventSource]
+    runs: Mapping[str, Run]
+    scores: Scores
+    eqs: pd.DataFrame
+    study: pd.DataFrame | None
+
+
+def publish(
+    cfg: DictConfig, folder: Path, data: Any, found: Findings, timings: Mapping[str, float]
+) -> None:
+    """Write `eqs.csv`, `study.csv`, `anchors.csv`, `correlation.json`, figures and report."""
+    write_table(found.eqs, folder / "eqs.csv")
+    related: Sequence[Correlation] = ()
+    if found.study is not None:
+        write_table(found.study, folder / "study.csv")
+        related = correlations(found.study)
+        write_correlations(related, folder / "correlation.json")
+    anchors = anchor_table(found.scores.anchors, f"eqs_{found.judge.headline.name}")
+    write_table(anchors, folder / "anchors.csv")
+    protocol = instantiate(cfg.protocol)
+    generator = getattr(data, "generator", None)
+    cards = {"mAP protocol": protocol.card()} if found.runs else {}
+    write_report(
+        folder,
+        ReportContent(
+            data_name=cfg.data.name,
+            data_is_rendered=generator is not None,
+            eqs=found.eqs,
+            study=found.study,
+            correlations=related,
+            anchors=anchors,
+            figures=draw(folder / "figures", found, protocol, related),
+            cards=cards,
+            hashes=hashes(found.judge, generator),
+            timings=timings,
+            unfinished=[name for name in found.systems if cards and name not in found.runs],
+            judge=found.judge.description,
+        ),
+    )
+
+
+def anchor_table(rows: Sequence[Mapping[str, Any]], headline: str) -> pd.DataFrame:
+    """Mean score of each anchor over the recordings, the highest headline first."""
+    frame = pd.DataFrame(rows).rename(
+        columns=lambda name: name if name in ("sequence", "anchor") else f"eqs_{name}"
+    )
+    means = frame.drop(columns="sequence").groupby("anchor", sort=False).mean()
+    return means.sort_values(headline, ascending=False).reset_index()
+
+
+def hashes(judge: Judge, generator: Any) -> dict[str, str]:
+    """What identifies the judge, the definition and, where there is one, the reference sensor."""
+    named = {
+        "EQS definition": judge.headline.definition.hash,
+        "judge's weights (sha256)": judge.weights_sha256,
+    }
+    if judge.headline.centre is not None:
+        named["judge's centre (sha256)"] = judge.headline.centre.sha256
+    if generator is not None:
+        named["reference sensor"] = generator.sensor.definition_hash()
+    return named
+
+
+def draw(
+    folder: Path,
+    found: Findings,
+    protocol: LabelProtocol,
+    related: Sequence[Correlation],
+) -> dict[str, ReportFigure]:
+    """Every figure the findings allow, in the order of the report."""
+    figures = {}
+    if found.study is not None:
+        drawn = score_against_accuracy(found.study, found.eqs, related)
+        figures["score_against_accuracy"] = report_figure(drawn, folder, "score_against_accuracy")
+        figures["accuracy"] = report_figure(accuracy_bars(found.study), folder, "accuracy")
+    figures["scores_by_sequence"] = report_figure(
+        sequence_dots(found.eqs), folder, "scores_by_sequence"
+    )
+    return figures | draw_scene(folder, found, protocol)
+
+
+def draw_scene(
+    folder: Path, found: Findings, protocol: LabelProtocol
+) -> dict[str, ReportFigure]:
+    """The figures that show one scene: events, rates, detections, score maps."""
+    shown = choose(found.recordings, protocol)
+    place = f"Recording {shown.recording.name}, frame {shown.index}."
+    sources = {"real": RecordedEvents(), **found.systems}
+    streams = around(shown, sources)
+    start, stop = shown.stop_us - RATE_SPAN_US, shown.stop_us
+    rates = {name: event_rate(each, start, stop, RATE_BIN_US) for name, each in streams.items()}
+    times = shown.recording.frame_times_us
+    ticks = times[(times >= start) & (times <= stop)] - start
+    drawn = {
+        "events": events_panels(
+            shown.frame, streams, start_us=stop - WINDOW_US, stop_us=stop, same="time"
+        ),
+        "event_rates": rate_curves(rates, bin_us=RATE_BIN_US, frame_times_us=ticks),
+        "score_maps": score_maps(
+            shown.frame,
+            mean_maps(found.scores.maps),
+            patch_px=found.scores.patch_px,
+            height=shown.recording.height,
+            width=shown.recording.width,
+        ),
+    }
+    if found.runs:
+        drawn["detections"] = detection_panels(
+            shown.events(RecordedEvents()),
+            shown.truth(protocol),
+            {name: detections(shown, run, protocol) for name, run in found.runs.items()},
+            class_names=protocol.class_names,
+            frame=shown.frame,
+        )
+    return {name: report_figure(each, folder, name, place) for name, each in drawn.items()}
+
+
+def mean_maps(maps: Mapping[str, Sequence[np.ndarray]]) -> dict[str, np.ndarray]:
+    """Mean map of each system over the recordings that share the first one's sensor."""
+    return {
+        name: np.mean([each for each in arrays if each.shape == arrays[0].shape], axis=0)
+        for name, arrays in maps.items()
+    }

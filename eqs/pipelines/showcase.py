@@ -1,0 +1,109 @@
+"""One instant of the test set, as every sensor, simulator and detector sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from eqs.data import Binning, EvaluationDataset, EventSource, LabelProtocol, Recording, WindowSource
+from eqs.events import EventReader, Events
+from eqs.models import RVTDetector, postprocess
+from eqs.pipelines.runs import Run
+from eqs.study import Boxes
+
+# Long enough for motion to show, short enough for a sharp picture.
+WINDOW_US = 50_000
+RATE_SPAN_US = 1_500_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Showcase:
+    """A recording and the frame at which it is shown.
+
+    Args:
+        recording: the recording.
+        index: number of the frame.
+    """
+
+    recording: Recording
+    index: int
+
+    @property
+    def stop_us(self) -> int:
+        """The instant itself."""
+        return int(self.recording.frame_times_us[self.index])
+
+    @property
+    def frame(self) -> NDArray[np.uint8]:
+        """The video frame of the instant."""
+        return self.recording.read_frame(self.index)
+
+    def events(self, source: EventSource, before_us: int = WINDOW_US) -> Events:
+        """Events of one source up to the instant."""
+        recording = self.recording
+        with EventReader(source.path(recording), recording.height, recording.width) as reader:
+            return reader.window(self.stop_us - before_us, self.stop_us)
+
+    def truth(self, protocol: LabelProtocol) -> Boxes:
+        """The labelled boxes of the instant that count."""
+        rows = self.recording.tracks_at(self.stop_us)
+        corners, labels = protocol.select(rows, self.recording.height, self.recording.width)
+        return Boxes(corners=corners, labels=labels)
+
+
+def choose(recordings: Sequence[Recording], protocol: LabelProtocol) -> Showcase:
+    """The labelled instant with most boxes after the first second, else a recording's middle."""
+    best = Showcase(recording=recordings[0], index=len(recordings[0].frame_times_us) // 2)
+    most = -1
+    for recording in recordings:
+        start = int(np.searchsorted(recording.frame_times_us, recording.frame_times_us[0] + 10**6))
+        for index in range(start, len(recording.frame_times_us)):
+            if recording.tracks is None:
+                break
+            shown = Showcase(recording=recording, index=index)
+            count = len(shown.truth(protocol).labels)
+            if count > most:
+                best, most = shown, count
+    return best
+
+
+def detections(showcase: Showcase, run: Run, protocol: LabelProtocol) -> Boxes:
+    """What a trained detector finds in the real events at the instant, having seen all before."""
+    config = run.config()
+    binning = Binning(
+        bins=config.datamodule.bins,
+        window_us=config.datamodule.window_us,
+        count_cutoff=config.datamodule.count_cutoff,
+    )
+    source = WindowSource(
+        recording=showcase.recording,
+        events_path=showcase.recording.events_path,
+        protocol=protocol,
+        binning=binning,
+    )
+    model = RVTDetector.from_checkpoint(
+        run.weights, partition_split_32=config.model.partition_split_32
+    ).eval()
+    states = None
+    last = showcase.index - 1  # window i ends at frame i + 1
+    with torch.no_grad():
+        for batch in EvaluationDataset([source], chunk_length=10):
+            maps, states = model.backbone.forward_sequence(batch["histograms"].float(), states)
+            if last < len(maps[0]):
+                break
+            last -= len(maps[0])
+        found = postprocess(model.detect([stage[last] for stage in maps]))[0]
+    return Boxes(
+        corners=found["boxes"].numpy(),
+        labels=found["labels"].numpy(),
+        scores=found["scores"].numpy(),
+    )
+
+
+def around(showcase: Showcase, sources: Mapping[str, EventSource]) -> dict[str, Events]:
+    """Every source's events over the seconds before the instant, for rates over time."""
+    return {name: showcase.events(source, RATE_SPAN_US) for name, source in sources.items()}
