@@ -8,6 +8,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from eqs.models.dot_product import attend
+
 NORM_EPS = 1e-5
 LAYER_SCALE_INIT = 1e-5
 
@@ -42,27 +44,19 @@ def scaled_linear(x: Tensor, linear: nn.Linear, scale: LayerScale) -> Tensor:
 
 
 class SelfAttention(nn.Module):
-    """Multi-head self-attention whose projection carries the layer scale.
-
-    Convention: the outputs of `qkv` are grouped by head first; head j owns rows 3dj to 3d(j+1),
-    within them query, key, value.
-    """
+    """Multi-head self-attention whose projection carries the layer scale."""
 
     def __init__(self, channels: int, head_dim: int) -> None:
         """Make as many heads as `head_dim` goes into `channels`."""
         super().__init__()
-        self.head_dim = head_dim
         self.num_heads = channels // head_dim
         self.qkv = nn.Linear(channels, 3 * channels)
         self.proj = nn.Linear(channels, channels)
 
     def forward(self, x: Tensor, scale: LayerScale) -> Tensor:
         """Attend within each group of tokens, (groups, tokens, C) -> the same."""
-        groups, tokens, _ = x.shape
-        qkv = self.qkv(x).view(groups, tokens, self.num_heads, 3, self.head_dim)
-        query, key, value = qkv.transpose(1, 2).unbind(3)
-        mixed = functional.scaled_dot_product_attention(query, key, value)
-        return scaled_linear(mixed.transpose(1, 2).reshape(x.shape), self.proj, scale)
+        mixed = attend(self.qkv(x), self.num_heads)
+        return scaled_linear(mixed, self.proj, scale)
 
 
 class Mlp(nn.Module):

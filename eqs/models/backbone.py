@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, cast
 
+import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -222,6 +223,9 @@ class RVTBackbone(nn.Module):
             )
         if not x.is_floating_point():
             x = x.to(compute_dtype(next(self.parameters())))
+        if torch.is_grad_enabled():
+            # Pays off in the gradient of the first convolution; for inference alone it does not.
+            x = x.flatten(0, 1).contiguous(memory_format=torch.channels_last).view(x.shape)
         height, width = x.shape[-2:]
         rows, columns = -(-height // self.multiple), -(-width // self.multiple)
         pad = (0, columns * self.multiple - width, 0, rows * self.multiple - height)

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol, cast
+from typing import cast
 
 import torch
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
+from eqs.models.context import Context
+
 State = tuple[Tensor, Tensor]
 
 sigmoid_backward = torch.ops.aten.sigmoid_backward.grad_input
 tanh_backward = torch.ops.aten.tanh_backward.grad_input
-
-
-class Context(Protocol):
-    """What autograd keeps between forward and backward; PyTorch's own type omits None."""
-
-    saved_tensors: tuple[Any, ...]
-
-    def save_for_backward(self, *tensors: Tensor | None) -> None:
-        """Keep tensors for the backward pass."""
-
-    def set_materialize_grads(self, value: bool) -> None:
-        """Choose whether missing gradients come as zeros or as None."""
 
 
 class LSTMSequence(torch.autograd.Function):
