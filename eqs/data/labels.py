@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,9 @@ class LabelProtocol:
     score_empty_frames: bool = True
 
     def __post_init__(self) -> None:
-        """Check the classes and sizes."""
+        """Check the classes and sizes, and copy what a configuration may hold in types of its own."""
+        plain = {str(name): tuple(int(each) for each in ids) for name, ids in self.classes.items()}
+        object.__setattr__(self, "classes", plain)
         ids = [number for numbers in self.classes.values() for number in numbers]
         if not self.classes or len(set(ids)) != len(ids):
             raise ValueError(
@@ -107,9 +110,7 @@ class LabelProtocol:
         """Everything that decides which boxes count, for storing beside a number."""
         return {
             "name": self.name,
-            "classes": {
-                name: [int(number) for number in ids] for name, ids in self.classes.items()
-            },
+            "classes": {name: list(ids) for name, ids in self.classes.items()},
             "min_side_px": self.min_side_px,
             "min_diagonal_px": self.min_diagonal_px,
             "reference_width": self.reference_width,
@@ -117,12 +118,13 @@ class LabelProtocol:
             "score_empty_frames": self.score_empty_frames,
         }
 
+    @cached_property
+    def _label_of(self) -> dict[int, int]:
+        return {number: label for label, ids in enumerate(self.classes.values()) for number in ids}
+
     def _labels(self, ids: NDArray[Any]) -> NDArray[np.int64]:
         """Class of each row, -1 for the ids that are left out."""
-        labels = np.full(len(ids), -1, np.int64)
-        for label, numbers in enumerate(self.classes.values()):
-            labels[np.isin(ids, list(numbers))] = label
-        return labels
+        return np.array([self._label_of.get(number, -1) for number in ids.tolist()], np.int64)
 
 
 def clip_boxes(boxes: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
