@@ -37,8 +37,8 @@ class LabelRule:
         least_inside: least share of the box that lies inside the image.
     """
 
-    smallest_width: float = 0.022
-    smallest_height: float = 0.055
+    smallest_width: float = 0.025
+    smallest_height: float = 0.07
     least_visible: float = 0.35
     least_inside: float = 0.3
 

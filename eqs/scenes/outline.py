@@ -331,7 +331,7 @@ def outline_actors(
         box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
         if -6.0 < depth < FAR_M:
             lit = _local_light(x, z, max(depth, 0.5), camera, light)
-            fade = math.exp(-max(depth, 0.0) / light[HAZE_REACH])
+            fade = light[HAZE_REACH] / (light[HAZE_REACH] + max(depth, 0.0))
             for p in range(first[i], first[i + 1]):
                 part = parts[p]
                 if used + 12 > len(polygons.marks) or _hidden_side(part[SEEN_FROM], heading, lit):

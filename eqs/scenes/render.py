@@ -48,7 +48,12 @@ from eqs.scenes.outline import (
 )
 
 Picture = NDArray[np.float32]
+Span = tuple[int, int]
 Position = tuple[int, float, float]  # cell, fraction of it, whole periods
+
+# What painting the fronts notes about each column for the ground: direction, row of the horizon,
+# first row of the ground, light of the headlights relative to the ambient light.
+DIR_X, DIR_Z, SHIFT, BASE, GLOW = range(5)
 
 VISTA_M: Final = 160.0  # beyond this depth the street ends in haze
 
@@ -57,12 +62,12 @@ class Surfaces(NamedTuple):
     """Textures of the street as summed-area tables, and where they lie.
 
     Args:
-        road: integral over (x, z) of radiance in lux, shape (nx + 1, nz + 1), periodic in z.
-        left: the same over (height, z) for the left side, shape (ny + 1, nz + 1).
+        road: integral over (z, x) of radiance in lux, shape (nz + 1, nx + 1), periodic in z.
+        left: the same over (z, height) for the left side, shape (nz + 1, ny + 1).
         right: the same for the right side.
-        roofs: integral over z of the height of left and right buildings, shape (2, nz + 1).
+        roofs: integral over z of the height of left and right buildings, shape (nz + 1, 2).
         sky: radiance in lux at the horizon and at 45 degrees, cloud contrast, shape (3,).
-        texel_m: side of a texel.
+        texels_per_m: resolution of the textures.
         half_street_m: distance of either side from the middle.
     """
 
@@ -71,175 +76,210 @@ class Surfaces(NamedTuple):
     right: Array
     roofs: Array
     sky: Array
-    texel_m: float
+    texels_per_m: float
     half_street_m: float
 
 
 @njit(cache=True, error_model="numpy")
-def _wrapped(position: float, period: int) -> tuple[int, float, float]:
+def _wrapped(position: float, period: int, turns_per_texel: float) -> Position:
     """Cell, fraction and number of whole periods of a texel position."""
-    turns = math.floor(position / period)
-    inside = position - turns * period
+    turns = math.floor(position * turns_per_texel)
+    inside = max(position - turns * period, 0.0)
     cell = min(int(inside), period - 1)
     return cell, inside - cell, turns
 
 
 @njit(cache=True, error_model="numpy")
-def _row_integral(table: Array, level: int, lower: Position, upper: Position) -> float:
-    """Integral along z of one row of the table between two wrapped positions."""
-    row = table[level]
-    total = row[row.shape[0] - 1]
-    high = row[upper[0]] + upper[1] * (row[upper[0] + 1] - row[upper[0]]) + upper[2] * total
-    low = row[lower[0]] + lower[1] * (row[lower[0] + 1] - row[lower[0]]) + lower[2] * total
-    return high - low
+def _strip_integral(table: Array, level: int, lower: Position, upper: Position) -> float:
+    """Integral along z, between two wrapped positions, of the table's column `level`."""
+    high, low = table[upper[0], level], table[lower[0], level]
+    high += upper[1] * (table[upper[0] + 1, level] - high)
+    low += lower[1] * (table[lower[0] + 1, level] - low)
+    return high - low + (upper[2] - lower[2]) * table[table.shape[0] - 1, level]
 
 
 @njit(cache=True, error_model="numpy")
 def _area_integral(table: Array, level: float, lower: Position, upper: Position) -> float:
-    """Integral from the table's first row to the fractional row `level`."""
-    top = table.shape[0] - 1
+    """Integral along z and, across, from the table's first column to the fraction `level`."""
+    top = table.shape[1] - 1
     level = min(max(level, 0.0), float(top))
     cell = min(int(level), top - 1)
-    base = _row_integral(table, cell, lower, upper)
-    return base + (level - cell) * (_row_integral(table, cell + 1, lower, upper) - base)
+    base = _strip_integral(table, cell, lower, upper)
+    return base + (level - cell) * (_strip_integral(table, cell + 1, lower, upper) - base)
 
 
 @njit(cache=True, error_model="numpy")
-def _sky_radiance(slope_up: float, azimuth: float, sky: Array) -> float:
-    """Radiance of the sky at a slope above the horizon, with soft clouds fixed in azimuth."""
+def _sky_radiance(slope_up: float, clouds: tuple[float, float], sky: Array) -> float:
+    """Radiance of the sky at a slope above the horizon; clouds change from low to high."""
     blend = min(max(slope_up, 0.0), 1.0)
-    clouds = math.sin(7.0 * azimuth + 1.3) + math.sin(17.0 * azimuth + 9.0 * blend)
-    return (sky[0] + blend * (sky[1] - sky[0])) * (1.0 + 0.5 * sky[2] * clouds)
+    cloud = clouds[0] + blend * clouds[1]
+    return (sky[0] + blend * (sky[1] - sky[0])) * (1.0 + sky[2] * cloud)
 
 
 @njit(cache=True, error_model="numpy")
-def paint_street(image: Picture, surfaces: Surfaces, camera: Array, light: Array) -> None:
-    """Paint sky, building fronts and ground into `image`, float32 lux, shape (H, W).
+def paint_street(
+    image: Picture, surfaces: Surfaces, camera: Array, light: Array, columns: Array
+) -> None:
+    """Paint sky, building fronts and ground.
 
-    Pixels of one column look along one vertical plane, so they share a front's position along
-    the street; and the bottom of one pixel is the top of the next.
+    Args:
+        image: light in lux, overwritten, shape (H, W).
+        surfaces: the street's textures.
+        camera: camera vector.
+        light: light vector.
+        columns: scratch, shape (W, 5).
+    """
+    _paint_fronts(image, surfaces, camera, light, columns)
+    _paint_ground(image, surfaces, camera, light, columns)
+
+
+@njit(cache=True, error_model="numpy")
+def _paint_fronts(
+    image: Picture, surfaces: Surfaces, camera: Array, light: Array, columns: Array
+) -> None:
+    """Paint sky and fronts column by column, and note where the ground begins in each.
+
+    Pixels of one column look along one vertical plane, so they share the position along the
+    street; and the bottom of one pixel is the top of the next.
     """
     height, width = image.shape
-    focal, texel = camera[FOCAL], surfaces.texel_m
+    focal, per_m = camera[FOCAL], surfaces.texels_per_m
+    period = surfaces.road.shape[0] - 1
     for column in range(width):
         a = (column + 0.5 - camera[MID_COLUMN]) / focal
         dir_x = a * camera[CAM_COS] + camera[CAM_SIN]
         dir_z = camera[CAM_COS] - a * camera[CAM_SIN]
         shift = camera[MID_ROW] + focal * (camera[CAM_PITCH] + camera[CAM_ROLL] * a)
-        right = dir_x > 0.0
-        wall = surfaces.right if right else surfaces.left
-        offset = (surfaces.half_street_m if right else -surfaces.half_street_m) - camera[CAM_X]
+        wall = surfaces.right if dir_x > 0.0 else surfaces.left
+        offset = math.copysign(surfaces.half_street_m, dir_x) - camera[CAM_X]
         depth = min(offset / dir_x if abs(dir_x) > 1e-9 else VISTA_M, VISTA_M)
-        haze = 1.0 - math.exp(-depth / light[HAZE_REACH])
-        if depth > 0.75 * VISTA_M:
-            haze += (1.0 - haze) * (depth / VISTA_M - 0.75) * 4.0
-        # Share of the front's row covered by this column: |dz/da| = offset / dir_x^2.
-        half = 0.5 * max(abs(depth / max(abs(dir_x), 1e-3)) / focal, texel)
-        half = min(half, 20.0)
-        middle = camera[CAM_Z] + depth * dir_z
-        period = wall.shape[1] - 1
-        lower = _wrapped((middle - half) / texel, period)
-        upper = _wrapped((middle + half) / texel, period)
-        span = 2.0 * half / texel
-        roof = _row_integral(surfaces.roofs, 1 if right else 0, lower, upper) / span
-        scale = depth / focal  # metres of front per row
-        roof_row = shift - (roof - camera[CAM_Y]) / scale
-        base_row = shift + camera[CAM_Y] / scale
+        haze = depth / (depth + light[HAZE_REACH])
+        haze += (1.0 - haze) * max(0.0, 4.0 * depth / VISTA_M - 3.0)
+        # Share of the front's length seen by this column: |dz/da| = |offset| / dir_x^2.
+        half = 0.5 * depth / max(abs(dir_x), 1e-3) / focal * per_m
+        half = min(max(half, 0.5), 0.2 * period)
+        middle = (camera[CAM_Z] + depth * dir_z) * per_m
+        lower = _wrapped(middle - half, period, 1.0 / period)
+        upper = _wrapped(middle + half, period, 1.0 / period)
+        scale = depth / focal * per_m  # texels of front per row
+        eye = camera[CAM_Y] * per_m
+        side = 1 if dir_x > 0.0 else 0
+        roof = _strip_integral(surfaces.roofs, side, lower, upper) / (2.0 * half)
+        roof_row, base_row = shift - (roof - eye) / scale, shift + eye / scale
         azimuth = math.atan2(dir_x, dir_z)
-        above = _area_integral(wall, (roof + scale) / texel, lower, upper)
-        beam_across = light[BEAM] * math.exp(-((a / 0.4) ** 2))
-        for row in range(height):
-            value, share = 0.0, 0.0
+        clouds = (math.sin(7.0 * azimuth + 1.3), 2.0 * math.sin(17.0 * azimuth + 0.4))
+        columns[column, DIR_X], columns[column, DIR_Z] = dir_x, dir_z
+        columns[column, SHIFT], columns[column, BASE] = shift, base_row
+        columns[column, GLOW] = light[BEAM] / light[AMBIENT] * math.exp(-((a / 0.4) ** 2))
+        above = -1.0  # integral of the front up to the top of the row, once known
+        for row in range(min(height, max(0, math.ceil(base_row)))):
+            value = 0.0
             sky_share = min(max(roof_row - row, 0.0), 1.0)
-            ground_share = min(max(row + 1.0 - base_row, 0.0), 1.0)
+            share = 1.0 - sky_share - min(max(row + 1.0 - base_row, 0.0), 1.0)
             if sky_share > 0.0:
                 slope = (shift - (row + 0.5)) / focal
-                value += sky_share * _sky_radiance(slope, azimuth, surfaces.sky)
-            share = 1.0 - sky_share - ground_share
+                value += sky_share * _sky_radiance(slope, clouds, surfaces.sky)
             if share > 1e-6:
-                top = min(camera[CAM_Y] - (row - shift) * scale, roof + scale)
-                below_m = camera[CAM_Y] - (row + 1.0 - shift) * scale
-                if sky_share > 0.0:
-                    above = _area_integral(wall, top / texel, lower, upper)
-                below = _area_integral(wall, below_m / texel, lower, upper)
-                if ground_share > 0.0:
-                    below_m = 0.0
-                cells = span * max((top - max(below_m, 0.0)) / texel, 1e-9)
-                front = (above - below) / cells
+                top = min(eye - (row - shift) * scale, roof)
+                bottom = max(eye - (row + 1.0 - shift) * scale, 0.0)
+                if above < 0.0:
+                    above = _area_integral(wall, top, lower, upper)
+                below = _area_integral(wall, bottom, lower, upper)
+                front = (above - below) / (2.0 * half * max(top - bottom, 1e-9))
                 above = below
                 value += share * (front * (1.0 - haze) + light[HAZE] * haze)
-            if ground_share > 0.0:
-                value += ground_share * _ground(
-                    surfaces, camera, light, row, shift, dir_x, dir_z, beam_across, base_row
-                )
             image[row, column] = value
 
 
 @njit(cache=True, error_model="numpy")
-def _ground(
-    surfaces: Surfaces,
-    camera: Array,
-    light: Array,
-    row: int,
-    shift: float,
-    dir_x: float,
-    dir_z: float,
-    beam: float,
-    base_row: float,
-) -> float:
-    focal, texel = camera[FOCAL], surfaces.texel_m
-    top = max(row + 0.0, base_row) - shift
-    bottom = max(row + 1.0 - shift, top + 1e-3)
-    reach = camera[CAM_Y] * focal
-    far, near = reach / max(top, 1e-3), reach / bottom
-    depth = 0.5 * (far + near)
-    half_z = 0.5 * max((far - near) * dir_z, texel)
-    half_x = 0.5 * max(depth / focal, texel)
-    z = camera[CAM_Z] + depth * dir_z
-    x = camera[CAM_X] + depth * dir_x + surfaces.half_street_m
-    table = surfaces.road
-    period = table.shape[1] - 1
-    half_z = min(half_z, 20.0)
-    lower = _wrapped((z - half_z) / texel, period)
-    upper = _wrapped((z + half_z) / texel, period)
-    x0, x1 = max(x - half_x, 0.0), min(x + half_x, 2.0 * surfaces.half_street_m)
-    if x1 - x0 < 0.5 * texel:
-        x0, x1 = max(x1 - texel, 0.0), max(x1, texel)
-    total = _area_integral(table, x1 / texel, lower, upper)
-    total -= _area_integral(table, x0 / texel, lower, upper)
-    value = total * texel * texel / (2.0 * half_z * (x1 - x0))
-    if beam > 0.0:
-        value *= 1.0 + beam / light[AMBIENT] / (1.0 + (depth / BEAM_REACH_M) ** 2)
-    fade = math.exp(-depth / light[HAZE_REACH])
-    return value * fade + light[HAZE] * (1.0 - fade)
+def _paint_ground(
+    image: Picture, surfaces: Surfaces, camera: Array, light: Array, columns: Array
+) -> None:
+    """Paint the ground row by row, where one row's depth keeps the texture in the cache."""
+    height, width = image.shape
+    table, per_m = surfaces.road, surfaces.texels_per_m
+    period, widest = table.shape[0] - 1, float(table.shape[1] - 1)
+    reach, turns = camera[CAM_Y] * camera[FOCAL], 1.0 / period
+    for row in range(height):
+        for column in range(width):
+            share = min(row + 1.0 - columns[column, BASE], 1.0)
+            if share <= 0.0:
+                continue
+            shift, dir_z = columns[column, SHIFT], columns[column, DIR_Z]
+            top = max(max(row + 0.0, columns[column, BASE]) - shift, 1e-3)
+            bottom = max(row + 1.0 - shift, top + 1e-3)
+            far, near = reach / top, reach / bottom
+            depth = 0.5 * (far + near)
+            # Everything below counts in texels; a pixel covers at least one.
+            half_z = 0.5 * min(max((far - near) * dir_z * per_m, 1.0), 0.4 * period)
+            half_x = 0.5 * max(depth * per_m / camera[FOCAL], 1.0)
+            z = (camera[CAM_Z] + depth * dir_z) * per_m
+            x = camera[CAM_X] + depth * columns[column, DIR_X] + surfaces.half_street_m
+            lower = _wrapped(z - half_z, period, turns)
+            upper = _wrapped(z + half_z, period, turns)
+            x1 = min(max(x * per_m + half_x, 1.0), widest)
+            x0 = max(min(x * per_m - half_x, x1 - 1.0), 0.0)
+            total = _area_integral(table, x1, lower, upper)
+            total -= _area_integral(table, x0, lower, upper)
+            value = total / (2.0 * half_z * (x1 - x0))
+            if columns[column, GLOW] > 0.0:
+                value *= 1.0 + columns[column, GLOW] / (1.0 + (depth / BEAM_REACH_M) ** 2)
+            fade = light[HAZE_REACH] / (light[HAZE_REACH] + depth)
+            value = value * fade + light[HAZE] * (1.0 - fade)
+            if share < 1.0:  # the rest of the pixel shows the front
+                value = image[row, column] + share * value
+            image[row, column] = value
 
 
 @njit(cache=True, error_model="numpy")
-def _actor_at(
-    polygons: Polygons, first: int, last: int, column: int, row: int
-) -> tuple[float, float, float]:
-    """Premultiplied radiance, opacity, and solid coverage of one actor in one pixel."""
-    x, y = column + 0.5, row + 0.5
-    colour, opacity, solid = 0.0, 0.0, 0.0
+def _row_span(edges: Array, count: int, y: float, margin: float, x0: int, x1: int) -> Span:
+    """Columns of one row whose centres lie at least `margin` pixels inside every edge."""
+    low, high = float(x0), float(x1)
+    for i in range(count):
+        a, rest = edges[i, 0], edges[i, 1] * y + edges[i, 2] - margin
+        if abs(a) < 1e-9:
+            if rest < 0.0:
+                return x0, x0
+        elif a > 0.0:
+            low = max(low, -rest / a - 0.5)
+        else:
+            high = min(high, -rest / a + 0.5)
+    first = min(max(math.ceil(low), x0), x1)
+    return first, max(first, min(math.ceil(high), x1))
+
+
+@njit(cache=True, error_model="numpy")
+def _join(layers: Array, row: int, column: int, join: int, c: float, values: Array) -> None:
+    """Lay a share `c` of one polygon over one pixel of an actor's picture."""
+    if join == SOLID:
+        layers[0, row, column] += c * (values[COLOUR] - layers[0, row, column])
+        layers[1, row, column] += c * (1.0 - layers[1, row, column])
+        layers[2, row, column] += c * (1.0 - layers[2, row, column])
+    elif join == ATOP:
+        opacity = layers[1, row, column]
+        layers[0, row, column] += c * (values[COLOUR] * opacity - layers[0, row, column])
+    elif join == SHADOW:
+        layers[1, row, column] += c * values[STRENGTH] * (1.0 - layers[1, row, column])
+
+
+@njit(cache=True, error_model="numpy")
+def _paint_actor(layers: Array, polygons: Polygons, first: int, last: int) -> None:
+    """Paint one actor into premultiplied radiance, opacity and solid coverage, (3, H, W)."""
     for p in range(first, last):
-        marks = polygons.marks[p]
-        if column < marks[X0] or column >= marks[X1] or row < marks[Y0] or row >= marks[Y1]:
-            continue
-        values = polygons.values[p]
-        c = coverage(polygons.edges[p], marks[EDGES], x, y, 0.0)
-        if values[RING] > 0.0 and c > 0.0:
-            c -= coverage(polygons.edges[p], marks[EDGES], x, y, values[RING])
-        if c <= 0.0:
-            continue
-        if marks[JOIN] == SOLID:
-            colour += c * (values[COLOUR] - colour)
-            opacity += c * (1.0 - opacity)
-            solid += c * (1.0 - solid)
-        elif marks[JOIN] == ATOP:
-            colour += c * (values[COLOUR] * opacity - colour)
-        elif marks[JOIN] == SHADOW:
-            opacity += c * values[STRENGTH] * (1.0 - opacity)
-    return colour, opacity, solid
+        marks, values, edges = polygons.marks[p], polygons.values[p], polygons.edges[p]
+        count, join, ring = marks[EDGES], marks[JOIN], values[RING]
+        for row in range(marks[Y0], marks[Y1]):
+            y = row + 0.5
+            begin, end = _row_span(edges, count, y, -0.5, marks[X0], marks[X1])
+            inner, outer = _row_span(edges, count, y, 0.5, begin, end)
+            for column in range(begin, end):
+                if inner <= column < outer and ring == 0.0:
+                    c = 1.0
+                else:
+                    c = coverage(edges, count, column + 0.5, y, 0.0)
+                    if ring > 0.0:
+                        c -= coverage(edges, count, column + 0.5, y, ring)
+                _join(layers, row, column, join, c, values)
 
 
 @njit(cache=True, error_model="numpy")
@@ -252,45 +292,51 @@ def _bounds(polygons: Polygons, first: int, last: int) -> tuple[int, int, int, i
 
 
 @njit(cache=True, error_model="numpy")
-def paint_actors(image: Picture, polygons: Polygons) -> None:
-    """Paint the actors over `image`, far ones first."""
+def paint_actors(image: Picture, polygons: Polygons, layers: Array) -> None:
+    """Paint the actors over `image`, far ones first; `layers` is scratch, shape (3, H, W)."""
     for i in polygons.order:
         first, last = polygons.spans[i]
         x0, x1, y0, y1 = _bounds(polygons, first, last)
+        if x0 >= x1 or y0 >= y1:
+            continue
+        layers[:2, y0:y1, x0:x1] = 0.0
+        _paint_actor(layers, polygons, first, last)
         for row in range(y0, y1):
             for column in range(x0, x1):
-                colour, opacity, _ = _actor_at(polygons, first, last, column, row)
+                opacity = layers[1, row, column]
                 if opacity > 0.0:
-                    image[row, column] += colour - opacity * image[row, column]
+                    image[row, column] += layers[0, row, column] - opacity * image[row, column]
 
 
 @njit(cache=True, error_model="numpy")
-def measure_actors(polygons: Polygons, owner: NDArray[np.int32], room: Array) -> Array:
+def measure_actors(polygons: Polygons, owner: NDArray[np.int32], layers: Array) -> Array:
     """Visible and whole area of each actor's solid outline inside the image.
 
     Args:
         polygons: filled storage.
-        owner: int32 (H, W), set to the nearest actor that covers at least half a pixel, else -1.
-        room: float64 (H, W) scratch; afterwards the share of each pixel no actor covers.
+        owner: set to the nearest actor that covers at least half a pixel, else -1, shape (H, W).
+        layers: scratch, shape (3, H, W).
 
     Returns:
         Areas in pixels, columns visible and whole, shape (actors, 2).
     """
     areas = np.zeros((len(polygons.spans), 2))
+    free = np.ones(owner.shape)  # share of each pixel that no nearer actor covers
     owner[:] = -1
-    room[:] = 1.0
     for k in range(len(polygons.order) - 1, -1, -1):
         i = polygons.order[k]
         first, last = polygons.spans[i]
         x0, x1, y0, y1 = _bounds(polygons, first, last)
+        if x0 >= x1 or y0 >= y1:
+            continue
+        layers[:, y0:y1, x0:x1] = 0.0
+        _paint_actor(layers, polygons, first, last)
         for row in range(y0, y1):
             for column in range(x0, x1):
-                solid = _actor_at(polygons, first, last, column, row)[2]
-                if solid <= 0.0:
-                    continue
-                areas[i, 0] += solid * room[row, column]
+                solid = layers[2, row, column]
+                areas[i, 0] += solid * free[row, column]
                 areas[i, 1] += solid
                 if solid >= 0.5 and owner[row, column] < 0:
                     owner[row, column] = i
-                room[row, column] *= 1.0 - solid
+                free[row, column] *= 1.0 - solid
     return areas

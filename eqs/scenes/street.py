@@ -146,16 +146,16 @@ def draw_surfaces(
     right, right_roofs = front(rng, lighting, 1.0, texel_m)
     road = ground(rng, lighting, texel_m, (left_roofs, right_roofs))
     sky = lighting.ambient_lux * (0.02 if night else rng.uniform(0.7, 1.3))
-    roofs = np.zeros((2, len(left_roofs) + 1))
-    roofs[:, 1:] = np.cumsum([left_roofs, right_roofs], axis=1)
+    roofs = np.zeros((len(left_roofs) + 1, 2))
+    roofs[1:] = np.cumsum(np.stack([left_roofs, right_roofs], axis=1), axis=0) / texel_m
     contrast = 0.05 if night else rng.uniform(0.05, 0.2)
     return Surfaces(
-        road=integrate(road),
-        left=integrate(left),
-        right=integrate(right),
+        road=integrate(road.T),
+        left=integrate(left.T),
+        right=integrate(right.T),
         roofs=roofs,
         sky=np.array([1.2 * sky, 0.8 * sky, contrast]),
-        texel_m=texel_m,
+        texels_per_m=1.0 / texel_m,
         half_street_m=HALF_STREET_M,
     )
 

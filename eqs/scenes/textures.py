@@ -38,7 +38,7 @@ class Lighting:
     window_lux: float
 
 
-def integrate(texture: Map) -> Map:
+def integrate(texture: Map) -> NDArray[np.float64]:
     """Summed-area table with a leading row and column of zeros."""
     table = np.zeros((texture.shape[0] + 1, texture.shape[1] + 1))
     table[1:, 1:] = texture.cumsum(0).cumsum(1)

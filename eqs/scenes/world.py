@@ -95,6 +95,8 @@ class DrivingWorld:
         self._parts = np.concatenate([actor.parts for actor in self.actors])
         self._first = np.cumsum([0] + [len(actor.parts) for actor in self.actors])
         self._polygons = Polygons.room_for(len(self.actors))
+        self._layers = np.zeros((3, height, width))
+        self._columns = np.zeros((width, 5))
 
     def camera(self, t_us: float) -> NDArray[np.float64]:
         """The camera vector at a time in microseconds since the start."""
@@ -124,15 +126,15 @@ class DrivingWorld:
         """The picture at `t_us` microseconds since the start, lux at the focal plane, (H, W)."""
         camera = self._outline(t_us)
         image = np.empty((self.height, self.width), np.float32)
-        paint_street(image, self._surfaces, camera, self._light)
-        paint_actors(image, self._polygons)
+        paint_street(image, self._surfaces, camera, self._light, self._columns)
+        paint_actors(image, self._polygons, self._layers)
         return image
 
     def view(self, t_us: float) -> View:
         """Outlines and visibility of the labelled actors at `t_us`."""
         self._outline(t_us)
         owner = np.empty((self.height, self.width), np.int32)
-        areas = measure_actors(self._polygons, owner, np.empty(owner.shape))
+        areas = measure_actors(self._polygons, owner, self._layers)
         labels = self._rows[:, -1].astype(np.int64)
         shown = np.flatnonzero((labels >= 0) & (areas[:, 1] > 0.0))
         return View(
