@@ -53,7 +53,7 @@ class LabelProtocol:
     score_empty_frames: bool = True
 
     def __post_init__(self) -> None:
-        """Check the classes and sizes, and copy what a configuration may hold in types of its own."""
+        """Check the classes and sizes, and keep plain copies of configured containers."""
         plain = {str(name): tuple(int(each) for each in ids) for name, ids in self.classes.items()}
         object.__setattr__(self, "classes", plain)
         ids = [number for numbers in self.classes.values() for number in numbers]

@@ -1,5 +1,7 @@
 """Loaders: each phase reads its own events, and epochs go on where they stopped."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import lightning
@@ -61,6 +63,11 @@ def module(dataset, tmp_path):
         return EventDataModule(dataset, PROTOCOL, own, tests, **settings)
 
     return build
+
+
+def test_processes_that_simulate_need_no_torch():
+    code = "import sys, eqs.data; sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def collected(loader):

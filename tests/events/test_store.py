@@ -180,6 +180,19 @@ def test_other_size_than_stated_is_refused(stored):
         Events.load(stored[1], height=24, width=640)
 
 
+def test_top_rows_look_like_a_smaller_sensor(stored):
+    events, path = stored
+    with EventReader(path, rows=10) as reader:
+        part = reader.read()
+        assert (reader.height, part.height, part.width) == (10, 10, 32)
+        assert reader.window(0, 1).height == 10
+    keep = events.y < 10
+    assert 0 < keep.sum() < len(events)
+    for name in "txyp":
+        np.testing.assert_array_equal(getattr(part, name), getattr(events, name)[keep])
+    assert same(EventReader(path, rows=99).read(), events)
+
+
 def test_missing_file(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"nowhere\.h5, found none.*data\.root"):
         Events.load(tmp_path / "nowhere.h5")
