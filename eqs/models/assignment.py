@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 CENTRE_RADIUS = 1.5
 IOU_COST = 3.0
@@ -65,6 +66,8 @@ def assign(boxes: Tensor, logits: Tensor, anchors: Tensor, labels: Tensor) -> As
         anchors: (A, 3), grid column, grid row, stride.
         labels: (F, M, 5) rows class, cx, cy, w, h in pixels; zero rows are padding.
     """
+    if labels.shape[1] == 0:
+        labels = functional.pad(labels, (0, 0, 0, 1))
     valid = labels.sum(-1) > 0
     near = in_range(labels, anchors) & valid[..., None]
     candidate, real = _candidates(near.any(1))
