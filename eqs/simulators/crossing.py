@@ -9,7 +9,9 @@ signal at the start, so that a pixel whose reference was moved from outside fall
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 # A signal counts as having reached a level it misses by this share of a threshold, so that a step
 # of exactly n thresholds gives n events whichever way the sum was rounded.
@@ -31,6 +33,41 @@ def levels_passed(difference: float, threshold_on: float, threshold_off: float) 
     if difference <= -threshold_off * _ALMOST_ONE:
         return -int(-difference / threshold_off + RELATIVE_TOLERANCE)
     return 0
+
+
+@njit(cache=True, nogil=True)
+def firing_pixels(
+    difference: NDArray[np.float64],
+    threshold_on: NDArray[np.float64],
+    threshold_off: NDArray[np.float64],
+    chosen: NDArray[np.int32],
+    passed: NDArray[np.int64],
+) -> tuple[int, int]:
+    """List the pixels that have passed a level, and how many levels each.
+
+    Args:
+        difference: signal above reference of each pixel.
+        threshold_on: threshold of each pixel.
+        threshold_off: the same for OFF, positive.
+        chosen: filled with the pixels, in rising order; one place longer than there are pixels.
+        passed: filled with their signed numbers of levels; as long as `chosen`.
+
+    Returns:
+        How many pixels are listed, and how many levels they have passed in all.
+    """
+    count = 0
+    for pixel in range(difference.size):  # without a branch, as few pixels fire
+        chosen[count] = pixel
+        above = difference[pixel] >= threshold_on[pixel] * _ALMOST_ONE
+        below = difference[pixel] <= -threshold_off[pixel] * _ALMOST_ONE
+        count += int(above | below)
+    total = 0
+    for index in range(count):
+        pixel = chosen[index]
+        levels = levels_passed(difference[pixel], threshold_on[pixel], threshold_off[pixel])
+        passed[index] = levels
+        total += abs(levels)
+    return count, total
 
 
 @njit(cache=True)

@@ -17,10 +17,11 @@ from eqs.simulators.base import Interval, Simulator, require_not_negative, requi
 from eqs.simulators.crossing import (
     SMALLEST_CHANGE_LOG,
     crossing_share,
-    levels_passed,
+    firing_pixels,
     officially_crossed,
 )
 from eqs.simulators.ordering import Fired, event_key, with_room
+from eqs.simulators.photoreceptor import log_intensity
 from eqs.simulators.randomness import draw_key, normal, word_at
 from eqs.simulators.thresholds import SMALLEST_THRESHOLD_LOG, threshold_map
 
@@ -75,12 +76,10 @@ class ESIM(Simulator):
         """Only the thresholds are random."""
         return self.threshold_sigma_log > 0
 
-    def log_intensity(self, levels: NDArray[np.float64]) -> NDArray[Any]:
+    def signal(self, levels: NDArray[np.float64]) -> NDArray[Any]:
         """The signal at grey levels 0..255; rounded to float32 in `faithful` mode."""
-        signal = np.log(self.log_offset + levels / 255.0)
-        if self.mode == "faithful":
-            return signal.astype(np.float32)
-        return signal
+        signal = log_intensity(levels, self.log_offset)
+        return signal.astype(np.float32) if self.mode == "faithful" else signal
 
     def begin(self, image: GreyImage, sequence: str) -> ESIMPixels:
         """The pixels after the first frame."""
@@ -97,27 +96,33 @@ class ESIMPixels:
         self.sequence = sequence
         pixels = image.codes.size
         self.codes = image.codes
-        self.signal = model.log_intensity(image.levels)
+        self.signal = model.signal(image.levels)
         self.reference = self.signal[image.codes]
         self.last_us = np.full(pixels if model.refractory_us > 0 else 1, -np.inf)
         sigma, seed = model.threshold_sigma_log, model.seed
         self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", pixels)
         self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", pixels)
+        self.difference = np.empty(pixels)
+        self.chosen = np.empty(pixels + 1, np.int32)
+        self.passed = np.empty(pixels + 1, np.int64)
         self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
-        signal = self.model.log_intensity(image.levels)
+        signal = self.model.signal(image.levels)
         self.keys, count = self._fire(image.codes, signal, interval)
         self.codes, self.signal = image.codes, signal
         return self.keys[:count]
 
     def _fire(self, codes: NDArray[Any], signal: NDArray[Any], interval: Interval) -> Fired:
-        return _fire_robust(
-            self.codes,
-            self.signal,
-            codes,
-            signal,
+        _difference(codes, signal, self.reference, self.difference)
+        chosen, total = firing_pixels(self.difference, self.on, self.off, self.chosen, self.passed)
+        keys = with_room(self.keys, total)
+        count = _fire_robust(
+            self.chosen[:chosen],
+            self.passed,
+            (self.codes, self.signal),
+            (codes, signal),
             self.reference,
             self.last_us,
             self.on,
@@ -125,8 +130,9 @@ class ESIMPixels:
             float(self.model.refractory_us),
             interval.start_us,
             interval.span_us,
-            self.keys,
+            keys,
         )
+        return keys, count
 
 
 class FaithfulESIMPixels(ESIMPixels):
@@ -152,11 +158,22 @@ class FaithfulESIMPixels(ESIMPixels):
 
 
 @njit(cache=True, nogil=True)
-def _fire_robust(
-    old_codes: NDArray[Any],
-    old_signal: NDArray[Any],
+def _difference(
     codes: NDArray[Any],
-    signal: NDArray[Any],
+    signal: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    difference: NDArray[np.float64],
+) -> None:
+    for pixel in range(codes.size):
+        difference[pixel] = signal[codes[pixel]] - reference[pixel]
+
+
+@njit(cache=True, nogil=True)
+def _fire_robust(
+    chosen: NDArray[np.int32],
+    passed: NDArray[np.int64],
+    start: tuple[NDArray[Any], NDArray[np.float64]],
+    end: tuple[NDArray[Any], NDArray[np.float64]],
     reference: NDArray[np.float64],
     last_us: NDArray[np.float64],
     on: NDArray[np.float64],
@@ -165,27 +182,24 @@ def _fire_robust(
     start_us: int,
     span_us: int,
     keys: NDArray[np.int64],
-) -> Fired:
+) -> int:
     count = 0
-    for pixel in range(codes.size):
-        last = signal[codes[pixel]]
-        passed = levels_passed(last - reference[pixel], on[pixel], off[pixel])
-        if passed == 0:
-            continue
-        keys = with_room(keys, count + abs(passed))
-        first = old_signal[old_codes[pixel]]
-        step = on[pixel] if passed > 0 else -off[pixel]
-        for ordinal in range(1, abs(passed) + 1):
+    for index in range(chosen.size):
+        pixel = chosen[index]
+        first, last = start[1][start[0][pixel]], end[1][end[0][pixel]]
+        polarity = 1 if passed[index] > 0 else 0
+        step = on[pixel] if polarity else -off[pixel]
+        for ordinal in range(1, abs(passed[index]) + 1):
             level = reference[pixel] + ordinal * step
             offset_us = crossing_share(level, first, last) * span_us
             if refractory_us > 0:
                 if start_us + offset_us - last_us[pixel] < refractory_us:
                     continue
                 last_us[pixel] = start_us + offset_us
-            keys[count] = event_key(start_us + int(offset_us), pixel, 1 if passed > 0 else 0)
+            keys[count] = event_key(start_us + int(offset_us), pixel, polarity)
             count += 1
-        reference[pixel] += abs(passed) * step
-    return keys, count
+        reference[pixel] += abs(passed[index]) * step
+    return count
 
 
 @njit(cache=True, nogil=True)

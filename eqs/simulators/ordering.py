@@ -21,6 +21,7 @@ TIME_SHIFT = PIXEL_BITS + 1
 MAX_PIXELS = 1 << PIXEL_BITS
 MAX_TIME_US = 1 << (62 - TIME_SHIFT)  # nine hours
 _DIGIT_BITS = 8
+_DIGIT_MASK = (1 << _DIGIT_BITS) - 1
 _PIXEL_MASK = (1 << PIXEL_BITS) - 1
 
 
@@ -41,29 +42,6 @@ def with_room(keys: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
 
 
 @njit(cache=True, nogil=True)
-def _sort_by_time(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
-    """Stable radix sort on the time above `start_us`."""
-    latest = 0
-    for key in keys:
-        latest = max(latest, (key >> TIME_SHIFT) - start_us)
-    source, target = keys.copy(), np.empty_like(keys)
-    shift = 0
-    while latest >> shift:
-        counts = np.zeros((1 << _DIGIT_BITS) + 1, np.int64)
-        for key in source:
-            counts[((((key >> TIME_SHIFT) - start_us) >> shift) & 255) + 1] += 1
-        for digit in range(255):
-            counts[digit + 1] += counts[digit]
-        for key in source:
-            digit = (((key >> TIME_SHIFT) - start_us) >> shift) & 255
-            target[counts[digit]] = key
-            counts[digit] += 1
-        source, target = target, source
-        shift += _DIGIT_BITS
-    return source
-
-
-@njit(cache=True, nogil=True)
 def _in_raster_order(keys: NDArray[np.int64]) -> bool:
     previous = -1
     for key in keys:
@@ -74,6 +52,29 @@ def _in_raster_order(keys: NDArray[np.int64]) -> bool:
     return True
 
 
+@njit(cache=True, nogil=True)
+def _radix_sorted(keys: NDArray[np.int64], base: int, lowest_bit: int) -> NDArray[np.int64]:
+    """Stable radix sort on what is left of `key - base` above its lowest bits."""
+    largest = 0
+    for key in keys:
+        largest = max(largest, key - base)
+    source, target = keys.copy(), np.empty_like(keys)
+    shift = lowest_bit
+    while largest >> shift:
+        counts = np.zeros((1 << _DIGIT_BITS) + 1, np.int64)
+        for key in source:
+            counts[(((key - base) >> shift) & _DIGIT_MASK) + 1] += 1
+        for digit in range(_DIGIT_MASK):
+            counts[digit + 1] += counts[digit]
+        for key in source:
+            digit = ((key - base) >> shift) & _DIGIT_MASK
+            target[counts[digit]] = key
+            counts[digit] += 1
+        source, target = target, source
+        shift += _DIGIT_BITS
+    return source
+
+
 def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
     """Sort the keys of one frame interval by (time, pixel); equal ones keep their order.
 
@@ -81,9 +82,9 @@ def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
         keys: events in the order in which a kernel wrote them, times not before `start_us`.
         start_us: start of the interval on the stream's clock.
     """
-    if _in_raster_order(keys):
-        return _sort_by_time(keys, start_us)
-    return keys[np.argsort(keys >> 1, kind="stable")]
+    # What was written row by row is already sorted by pixel, and only its times need sorting.
+    lowest_bit = TIME_SHIFT if _in_raster_order(keys) else 1
+    return _radix_sorted(keys, start_us << TIME_SHIFT, lowest_bit)
 
 
 class ReorderBuffer:

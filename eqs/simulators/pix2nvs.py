@@ -190,7 +190,9 @@ def _fire_blocks(
         rows = (top, min(top + block, height))
         for left in range(0, width, block):
             columns = (left, min(left + block, width))
-            pixel = _strongest(codes, signal, reference, rows, columns, width)
+            pixel = top * width + left
+            if block > 1:
+                pixel = _strongest(codes, signal, reference, rows, columns, width)
             limit = threshold[pixel]
             difference = signal[codes[pixel]] - reference[pixel]
             distance = abs(difference)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from eqs.simulators import V2E
-from eqs.simulators.v2e import lin_log
+from eqs.simulators.photoreceptor import lin_log
 
 CLEAN = {"threshold_sigma_log": 0.0, "cutoff_hz": 0.0, "leak_hz": 0.0, "shot_noise_hz": 0.0}
 
