@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Picture = NDArray[np.float32]
-SUB_EXPOSURE_US = 1000
+SUB_EXPOSURE_US = 2000
 METERED_SHARE = 85.0  # percentile of the light that auto-exposure looks at
 METERED_LINEAR = 0.55  # and what it makes of it, in linear light
 

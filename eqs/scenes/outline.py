@@ -53,6 +53,7 @@ from eqs.scenes.optics import (
 )
 
 FAR_M: Final = 110.0
+REACH_M: Final = 5.0  # no part of an actor is farther from its middle
 CORNERS: Final = 8
 
 Lit = tuple[float, float, float, float]  # direction to the camera (x, z), headlights, lamps
@@ -273,7 +274,8 @@ def _add_part(
         points[:CORNERS] = corners[:CORNERS]
         count = convex_hull(points, CORNERS, outline)
     else:
-        depth = _disc_corners(part, x, z, heading, camera, outline)
+        depth = _disc_corners(part, x, z, heading, camera, corners)
+        outline[:CORNERS] = corners[:CORNERS]
         ring_px = camera[FOCAL] * part[LOW + 3] / depth
         count = CORNERS
     if part[MODE] == SHADOW:
@@ -289,11 +291,10 @@ def _add_part(
 
 
 @njit(cache=True, error_model="numpy")
-def _grow_box(box: Array, polygons: Polygons, count: int) -> None:
-    outline = polygons.scratch[1]
-    for i in range(count):
-        box[0], box[2] = min(box[0], outline[i, 0]), max(box[2], outline[i, 0])
-        box[1], box[3] = min(box[1], outline[i, 1]), max(box[3], outline[i, 1])
+def _grow_box(box: Array, corners: Array) -> None:
+    for i in range(CORNERS):
+        box[0], box[2] = min(box[0], corners[i, 0]), max(box[2], corners[i, 0])
+        box[1], box[3] = min(box[1], corners[i, 1]), max(box[3], corners[i, 1])
 
 
 @njit(cache=True, error_model="numpy")
@@ -318,6 +319,7 @@ def outline_actors(
         light: light vector.
     """
     used = 0
+    half_view = camera[MID_COLUMN] / camera[FOCAL]
     for i in range(len(actors)):
         actor = actors[i]
         heading = actor[HEADING]
@@ -329,7 +331,8 @@ def outline_actors(
         polygons.spans[i, 0] = used
         box = polygons.boxes[i]
         box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
-        if -6.0 < depth < FAR_M:
+        beside = abs(dx * camera[CAM_COS] - dz * camera[CAM_SIN])
+        if -REACH_M < depth < FAR_M and beside < depth * half_view + 1.5 * REACH_M:
             lit = _local_light(x, z, max(depth, 0.5), camera, light)
             fade = light[HAZE_REACH] / (light[HAZE_REACH] + max(depth, 0.0))
             for p in range(first[i], first[i + 1]):
@@ -340,10 +343,7 @@ def outline_actors(
                     polygons, used, part, x, z, heading, time_s, camera, light, lit, fade
                 )
                 if part[MODE] == SOLID:
-                    count = CORNERS
-                    if part[SHAPE] == FRUSTUM:
-                        count = convex_hull(polygons.scratch[3], CORNERS, polygons.scratch[1])
-                    _grow_box(box, polygons, count)
+                    _grow_box(box, polygons.scratch[0])
         polygons.spans[i, 1] = used
     polygons.order[:] = np.argsort(actors[:, DEPTH_SORT])
     return used

@@ -120,7 +120,7 @@ def front(
         edge = max(1, round(0.25 / texel_m))
         albedo[:, start : start + edge] *= 0.45
         start = stop
-    albedo *= mottle(rng, albedo.shape, texel_m, 0.16)
+    albedo *= mottle(rng, albedo.shape, texel_m, 0.22)
     height = (np.arange(rows)[:, None] + 0.5) * texel_m
     light = np.full(albedo.shape, lighting.ambient_lux)
     light += lighting.sun_lux * 0.7 * (side == lighting.sun_side)
@@ -150,7 +150,7 @@ def ground(
     z = ((np.arange(length) + 0.5) * texel_m)[None]
     asphalt, paving = rng.uniform(0.07, 0.13), rng.uniform(0.2, 0.32)
     albedo = np.where(np.abs(x) < KERB_M, asphalt, paving) * np.ones_like(z)
-    albedo *= mottle(rng, albedo.shape, texel_m, 0.20)
+    albedo *= mottle(rng, albedo.shape, texel_m, 0.28)
     white, dark = _markings(rng, x, z)
     albedo[dark] *= 0.45
     for _ in range(40):  # patches, manholes and tar seams
