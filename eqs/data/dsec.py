@@ -18,6 +18,10 @@ SPLIT_FOLDERS = ("train", "val", "test")
 class Generator(Protocol):
     """Makes a data set that does not exist yet."""
 
+    @property
+    def sensor_hash(self) -> str:
+        """What identifies the event camera that the data set is made with."""
+
     def generate(self, root: Path) -> None:
         """Make what is missing below `root`; nothing where all is there."""
 

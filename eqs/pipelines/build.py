@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from eqs.data import EventSource, RecordedEvents, SimulatedEvents
+from eqs.data import DSECFolder, EventSource, RecordedEvents, RecordingFolder, SimulatedEvents
 from eqs.simulators import Simulator
+
+Dataset = DSECFolder | RecordingFolder
 
 
 def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:
@@ -20,7 +21,7 @@ def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:
     return SimulatedEvents(built, Path(cfg.paths.simulated) / cfg.data.name)
 
 
-def dataset(cfg: DictConfig) -> Any:
+def dataset(cfg: DictConfig) -> Dataset:
     """The configured data set, generated or checked, ready to be read."""
     built = instantiate(cfg.data)
     built.prepare()

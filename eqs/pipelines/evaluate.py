@@ -99,8 +99,9 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         source.prepare(recordings)
     judge = find_judge(cfg)
     with times.measure("score"):
-        scores = score_recordings(judge, recordings, systems)
-    table = eqs_table(scores.rows)
+        scores = score_recordings(judge, recordings, systems, data.crop_rows)
+    rows = [{"simulator": systems[row["system"]].name, **row} for row in scores.rows]
+    table = eqs_table(rows)
     names = short_names([(run.result()["simulator"], run.result()["system"]) for run in runs])
     found = Findings(
         recordings=recordings,

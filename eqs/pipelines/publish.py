@@ -12,7 +12,8 @@ import pandas as pd
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from eqs.data import EventSource, LabelProtocol, RecordedEvents, Recording
+from eqs.data import DSECFolder, EventSource, LabelProtocol, RecordedEvents, Recording
+from eqs.pipelines.build import Dataset
 from eqs.pipelines.judge import Judge
 from eqs.pipelines.runs import Run
 from eqs.pipelines.score import Scores
@@ -63,7 +64,7 @@ class Findings:
 
 
 def publish(
-    cfg: DictConfig, folder: Path, data: Any, found: Findings, timings: Mapping[str, float]
+    cfg: DictConfig, folder: Path, data: Dataset, found: Findings, timings: Mapping[str, float]
 ) -> None:
     """Write `eqs.csv`, `study.csv`, `anchors.csv`, `correlation.json`, figures and report."""
     write_table(found.eqs, folder / "eqs.csv")
@@ -75,20 +76,21 @@ def publish(
     anchors = anchor_table(found.scores.anchors, f"eqs_{found.judge.headline.name}")
     write_table(anchors, folder / "anchors.csv")
     protocol = instantiate(cfg.protocol)
-    generator = getattr(data, "generator", None)
+    generator = data.generator if isinstance(data, DSECFolder) else None
+    sensor = generator.sensor_hash if generator is not None else None
     cards = {"mAP protocol": protocol.card()} if found.runs else {}
     write_report(
         folder,
         ReportContent(
             data_name=cfg.data.name,
-            data_is_rendered=generator is not None,
+            data_is_rendered=sensor is not None,
             eqs=found.eqs,
             study=found.study,
             correlations=related,
             anchors=anchors,
             figures=draw(folder / "figures", found, protocol, related),
             cards=cards,
-            hashes=hashes(found.judge, generator),
+            hashes=hashes(found.judge, sensor),
             timings=timings,
             unfinished=[name for name in found.systems if cards and name not in found.runs],
             judge=found.judge.description,
@@ -105,7 +107,7 @@ def anchor_table(rows: Sequence[Mapping[str, Any]], headline: str) -> pd.DataFra
     return means.sort_values(headline, ascending=False).reset_index()
 
 
-def hashes(judge: Judge, generator: Any) -> dict[str, str]:
+def hashes(judge: Judge, sensor: str | None) -> dict[str, str]:
     """What identifies the judge, the definition and, where there is one, the reference sensor."""
     named = {
         "EQS definition": judge.headline.definition.hash,
@@ -113,8 +115,8 @@ def hashes(judge: Judge, generator: Any) -> dict[str, str]:
     }
     if judge.headline.centre is not None:
         named["judge's centre (sha256)"] = judge.headline.centre.sha256
-    if generator is not None:
-        named["reference sensor"] = generator.sensor.definition_hash()
+    if sensor is not None:
+        named["reference sensor"] = sensor
     return named
 
 
@@ -136,9 +138,7 @@ def draw(
     return figures | draw_scene(folder, found, protocol)
 
 
-def draw_scene(
-    folder: Path, found: Findings, protocol: LabelProtocol
-) -> dict[str, ReportFigure]:
+def draw_scene(folder: Path, found: Findings, protocol: LabelProtocol) -> dict[str, ReportFigure]:
     """The figures that show one scene: events, rates, detections, score maps."""
     shown = choose(found.recordings, protocol)
     place = f"Recording {shown.recording.name}, frame {shown.index}."

@@ -12,7 +12,11 @@ def precision(device: str) -> str:
     bfloat16 autocast pays on processors that multiply in it and costs time on the others.
     """
     if device == "gpu" or (device == "auto" and torch.cuda.is_available()):
-        return "bf16-mixed" if torch.cuda.is_available() and torch.cuda.is_bf16_supported() else "16-mixed"
+        return (
+            "bf16-mixed"
+            if torch.cuda.is_available() and torch.cuda.is_bf16_supported()
+            else "16-mixed"
+        )
     return "bf16-mixed" if torch.cpu.get_capabilities().get("avx512_bf16") else "32-true"
 
 

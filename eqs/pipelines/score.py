@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
-from eqs.data import EventSource, Recording
+from eqs.data import EventSource, Recording, overlap_us
 from eqs.events import EventReader
-from eqs.metrics import StreamScore, score_streams
+from eqs.metrics import score_streams
 from eqs.metrics.corruptions import anchors
 from eqs.pipelines.judge import Judge
 
@@ -42,86 +43,97 @@ def score_recordings(
     judge: Judge,
     recordings: Sequence[Recording],
     systems: Mapping[str, EventSource],
+    rows: int | None = None,
 ) -> Scores:
     """Score every system on every recording; the streams must exist already.
 
     Args:
         judge: what scores.
         recordings: recordings with frames and real events.
-        systems: where each system's events lie, by its label in the tables.
+        systems: where each system's events lie, by its name in the tables.
+        rows: rows from the top that are looked at; all of them if None.
     """
     scores = Scores()
     for index, recording in enumerate(track(recordings, description="scoring")):
         other = recordings[(index + 1) % len(recordings)]
-        score_recording(judge, recording, other, systems, scores)
+        with ExitStack() as stack:
+
+            def opened(recording: Recording, path: Path) -> EventReader:
+                size = recording.height, recording.width
+                return stack.enter_context(EventReader(path, *size, rows=rows))
+
+            real = opened(recording, recording.events_path)
+            streams = {name: opened(recording, s.path(recording)) for name, s in systems.items()}
+            unrelated = opened(other, other.events_path) if other is not recording else None
+            score_recording(judge, recording, real, streams, unrelated, scores)
     return scores
 
 
 def score_recording(
     judge: Judge,
     recording: Recording,
-    other: Recording,
-    systems: Mapping[str, EventSource],
+    real: EventReader,
+    streams: Mapping[str, EventReader],
+    other: EventReader | None,
     scores: Scores,
 ) -> None:
-    """Add the scores of one recording; `other` lends the chance level unless it is the same."""
-    with ExitStack() as stack:
-        real = stack.enter_context(reader(recording, recording.events_path))
-        streams = [stack.enter_context(reader(recording, s.path(recording))) for s in systems.values()]
-        start, stop = scoring_span(recording, real)
-        found = score_streams(
-            judge.backbone, real, streams, judge.readings, start_us=start, stop_us=stop
+    """Add the scores of one recording; `other` lends the chance level."""
+    start, stop = overlap_us(recording.frame_times_us, real.start_us, real.stop_us)
+    found = score_streams(
+        judge.backbone,
+        real,
+        list(streams.values()),
+        judge.readings,
+        start_us=start,
+        stop_us=stop,
+    )
+    known = score_anchors(judge, recording, real, other, start, stop)
+    shared = {
+        "sequence": recording.name,
+        "eqs_chance": known.get("chance", {}).get(judge.headline.name, np.nan),
+        "eqs_ceiling": known["ceiling"][judge.headline.name],
+        "n_events_real": len(real.window(start, stop)),
+        "definition": judge.headline.definition.hash,
+        "weights_sha256": judge.weights_sha256,
+    }
+    for (name, stream), by_reading in zip(streams.items(), found, strict=True):
+        headline = by_reading[judge.headline.name]
+        scores.maps.setdefault(name, []).append(headline.map)
+        scores.patch_px = headline.patch_px
+        scores.rows.append(
+            {
+                "system": name,
+                **shared,
+                "eqs": headline.score,
+                **{f"eqs_{reading}": score.score for reading, score in by_reading.items()},
+                "n_windows": headline.n_windows,
+                "n_events_sim": len(stream.window(start, stop)),
+            }
         )
-        known = score_anchors(judge, recording, other, real, (start, stop))
-        n_events_real = len(real.window(start, stop))
-        for label, stream, by_reading in zip(systems, streams, found, strict=True):
-            headline = by_reading[judge.headline.name]
-            scores.maps.setdefault(label, []).append(headline.map)
-            scores.patch_px = headline.patch_px
-            scores.rows.append(
-                {
-                    "simulator": systems[label].name,
-                    "system": label,
-                    "sequence": recording.name,
-                    "eqs": headline.score,
-                    **columns(by_reading),
-                    "eqs_chance": known.get("chance", {}).get(judge.headline.name, np.nan),
-                    "eqs_ceiling": known["ceiling"][judge.headline.name],
-                    "n_windows": headline.n_windows,
-                    "n_events_real": n_events_real,
-                    "n_events_sim": len(stream.window(start, stop)),
-                    "definition": judge.headline.definition.hash,
-                    "weights_sha256": judge.weights_sha256,
-                }
-            )
     scores.anchors += [
         {"sequence": recording.name, "anchor": name, **values} for name, values in known.items()
     ]
 
 
-def scoring_span(recording: Recording, real: EventReader) -> tuple[int, int]:
-    """Where both frames and events are there: a simulator cannot know what came before a frame."""
-    times = recording.frame_times_us
-    return max(int(times[0]), real.start_us), min(int(times[-1]), real.stop_us)
-
-
 def score_anchors(
-    judge: Judge, recording: Recording, other: Recording, real: EventReader, span: tuple[int, int]
+    judge: Judge,
+    recording: Recording,
+    real: EventReader,
+    other: EventReader | None,
+    start_us: int,
+    stop_us: int,
 ) -> dict[str, dict[str, float]]:
     """Scores by anchor and reading."""
-    start, stop = span[0], min(span[1], span[0] + ANCHOR_US)
-    events = real.window(start, stop)
-    chance = None
-    if other.name != recording.name and (other.height, other.width) == (real.height, real.width):
-        with reader(other, other.events_path) as source:
-            chance = source.window(source.start_us, source.start_us + stop - start)
+    stop_us = min(stop_us, start_us + ANCHOR_US)
+    events = real.window(start_us, stop_us)
+    alike = other is not None and (other.height, other.width) == (real.height, real.width)
     streams = anchors(
         events,
-        other=chance,
+        other=other.window(other.start_us, other.start_us + ANCHOR_US) if other and alike else None,
         frame_times_us=recording.frame_times_us,
         window_us=judge.headline.definition.window_us,
-        start_us=start,
-        stop_us=stop,
+        start_us=start_us,
+        stop_us=stop_us,
         key=recording.name,
     )
     found = score_streams(
@@ -129,20 +141,10 @@ def score_anchors(
         events,
         list(streams.values()),
         judge.readings,
-        start_us=start,
-        stop_us=stop,
+        start_us=start_us,
+        stop_us=stop_us,
     )
     return {
         name: {reading: score.score for reading, score in by_reading.items()}
         for name, by_reading in zip(streams, found, strict=True)
     }
-
-
-def reader(recording: Recording, path: Any) -> EventReader:
-    """A reader of one of the recording's streams, at the recording's sensor size."""
-    return EventReader(path, height=recording.height, width=recording.width)
-
-
-def columns(by_reading: Mapping[str, StreamScore]) -> dict[str, float]:
-    """The scores as columns `eqs_<tap>_<raw|centred>`."""
-    return {f"eqs_{name}": score.score for name, score in by_reading.items()}

@@ -91,8 +91,10 @@ def detections(showcase: Showcase, run: Run, protocol: LabelProtocol) -> Boxes:
     states = None
     last = showcase.index - 1  # window i ends at frame i + 1
     with torch.no_grad():
-        for batch in EvaluationDataset([source], chunk_length=10):
-            maps, states = model.backbone.forward_sequence(batch["histograms"].float(), states)
+        chunks = EvaluationDataset([source], chunk_length=10)
+        for chunk in range(len(chunks)):
+            histograms = chunks[chunk]["histograms"].float()
+            maps, states = model.backbone.forward_sequence(histograms, states)
             if last < len(maps[0]):
                 break
             last -= len(maps[0])

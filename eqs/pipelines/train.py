@@ -14,15 +14,16 @@ from lightning.pytorch.callbacks import Callback, ModelCheckpoint
 from omegaconf import DictConfig
 from rich.console import Console
 
-from eqs.data import EventSource, RecordedEvents
+from eqs.data import EventSource, LabelProtocol, RecordedEvents
+from eqs.files import short_hash
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.runs import Run, recipe_hash
-from eqs.files import short_hash
 from eqs.pipelines.timing import PhaseTimes
 from eqs.tasks import DetectionTask
 
 log = logging.getLogger(__name__)
+SPLITS = ("train", "val", "test")
 
 
 @explained
@@ -48,8 +49,7 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
     with times.measure("generate data"):
         data = dataset(cfg)
     with times.measure(f"simulate {source.label}"):
-        for split in ("train", "val", "test"):
-            source.prepare(data.recordings(split))
+        source.prepare([r for split in SPLITS for r in data.recordings(split)])
     run.save_config(cfg)
     tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
     if isinstance(source, RecordedEvents):
@@ -70,7 +70,7 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
     run.finish(describe(cfg, source, protocol.card(), values, time.perf_counter() - start))
 
 
-def build_task(cfg: DictConfig, protocol: Any, test_streams: list[str]) -> DetectionTask:
+def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]) -> DetectionTask:
     """The configured detector in its training module."""
     model = instantiate(cfg.model)
     return instantiate(cfg.task)(

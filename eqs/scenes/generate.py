@@ -22,7 +22,7 @@ from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.world import DrivingWorld
 
-VERSION: Final = 2  # raise it whenever the same parameters give other files
+VERSION: Final = 3  # raise it whenever the same parameters give other files
 FRAME_PERIOD_US: Final = 50_000
 LEAD_IN_US: Final = 60_000  # events before the first frame
 LEAD_OUT_US: Final = 10_000  # and after the last one
@@ -222,6 +222,11 @@ class DSECMini:
                 f"Expected at least 2 frames, got {self.frames}; set data.generator.frames"
             )
 
+    @property
+    def sensor_hash(self) -> str:
+        """Hash of the reference sensor's parameters."""
+        return self.sensor.definition_hash()
+
     def recordings(self) -> list[Recording]:
         """All sequences, in the order of their names."""
         width, height = (int(number) for number in self.size.split("x"))
@@ -259,7 +264,7 @@ class DSECMini:
             manifest,
             {
                 "parameters": wanted,
-                "sensor_hash": self.sensor.definition_hash(),
+                "sensor_hash": self.sensor_hash,
                 "sequences": records,
             },
         )

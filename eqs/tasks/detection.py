@@ -7,6 +7,7 @@ from typing import Any
 
 import lightning
 import torch
+from lightning.pytorch.utilities.types import OptimizerLRScheduler
 from torch import Tensor, nn
 from torch.optim import Optimizer
 from torch.optim.lr_scheduler import LRScheduler
@@ -53,6 +54,7 @@ class DetectionTask(lightning.LightningModule):
         *,
         drop_empty_frames: bool = False,
     ) -> None:
+        """Keep the parts and prepare one mAP for each stream."""
         super().__init__()
         self.model = model
         self.make_optimizer = optimizer
@@ -67,7 +69,8 @@ class DetectionTask(lightning.LightningModule):
             )
 
         self.val_precision = precision_metric()
-        self.test_precision = nn.ModuleList(precision_metric() for _ in self.test_streams)
+        self.test_precision = [precision_metric() for _ in self.test_streams]
+        self.test_metrics = nn.ModuleList(self.test_precision)  # so that they move with the task
         self._train_states: States | None = None
         self._evaluation_states: States | None = None
 
@@ -116,27 +119,32 @@ class DetectionTask(lightning.LightningModule):
         confidence, overlap = self.thresholds
         return postprocess(predictions.float(), confidence, overlap)
 
-    def _evaluate(self, batch: Batch, metric: nn.Module) -> None:
+    def _evaluate(self, batch: Batch, metric: MeanAveragePrecision) -> None:
         detections = self.detect(batch)
         targets = [ground_truth(rows) for rows in batch["labels"][batch["labelled"]]]
         if detections:
             metric.update(detections, targets)
 
-    def _log_precision(self, prefix: str, metric: nn.Module) -> None:
+    def _log_precision(self, prefix: str, metric: MeanAveragePrecision) -> None:
         values = metric.compute()
         metric.reset()
         self._evaluation_states = None
-        scalars = {key: value for key, value in values.items() if key.startswith("map") and not value.ndim}
+        scalars = {
+            key: value for key, value in values.items() if key.startswith("map") and not value.ndim
+        }
         for key in ("map_per_class", "map_50_per_class", "ground_truths_per_class"):
             pairs = zip(self.class_names, values[key], strict=True)
             scalars |= {f"{key}/{name}": value.float() for name, value in pairs}
         self.log_dict({f"{prefix}/{key}": value for key, value in scalars.items()})
 
-    def configure_optimizers(self) -> dict[str, Any]:
+    def configure_optimizers(self) -> OptimizerLRScheduler:
         """Optimizer with a schedule that moves once per batch."""
         optimizer = self.make_optimizer(self.model.parameters())
-        scheduler = {"scheduler": self.make_scheduler(optimizer), "interval": "step"}
-        return {"optimizer": optimizer, "lr_scheduler": scheduler}
+        scheduler = self.make_scheduler(optimizer)
+        return {
+            "optimizer": optimizer,
+            "lr_scheduler": {"scheduler": scheduler, "interval": "step"},
+        }
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Keep the recurrent states, so that a resumed run goes on where it stopped."""
