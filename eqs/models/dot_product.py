@@ -9,9 +9,9 @@ from torch.nn import functional
 
 from eqs.models.context import Context
 
-# Up to so many tokens a group is one small matrix on the CPU, for which PyTorch's fused kernel
-# spends most of its time on overhead (backward in bfloat16: several times the whole of this).
-SMALL_GROUP = 128
+# Up to so many tokens, products of whole groups beat PyTorch's fused kernel on the CPU: in float32
+# because of its overhead for tiny groups, in half precision because of its slow backward pass.
+SMALL_GROUP = {torch.float32: 16, torch.bfloat16: 512}
 
 
 class SmallGroupAttention(torch.autograd.Function):
@@ -61,7 +61,7 @@ def attend(qkv: Tensor, num_heads: int) -> Tensor:
     """
     groups, tokens, channels = qkv.shape
     split = qkv.view(groups, tokens, num_heads, 3, -1)
-    if qkv.device.type == "cpu" and tokens <= SMALL_GROUP:
+    if qkv.device.type == "cpu" and tokens <= SMALL_GROUP.get(qkv.dtype, 0):
         by_head = split.permute(3, 0, 2, 1, 4).reshape(3, groups * num_heads, tokens, -1)
         with torch.autocast("cpu", enabled=False):
             mixed = SmallGroupAttention.apply(by_head)
