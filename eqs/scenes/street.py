@@ -283,9 +283,9 @@ def draw_people(
     for _ in range(rng.integers(2, 5)):
         speed, kind = rng.uniform(3.0, 6.5), rng.random()
         parts = _cyclist(rng, lit=night)
-        if kind < 0.55:
+        if kind < 0.45:
             x, z, heading = rng.uniform(3.1, 3.9), rng.uniform(9.0, 0.7 * way_m + 22.0), 0.0
-        elif kind < 0.8:
+        elif kind < 0.65:
             x, z, heading = -rng.uniform(3.3, 3.9), rng.uniform(15.0, way_m + 35.0), np.pi
         else:
             heading = float(rng.choice([-1.0, 1.0])) * np.pi / 2

@@ -46,8 +46,11 @@ def integrate(texture: Map) -> NDArray[np.float64]:
 
 
 def mottle(rng: np.random.Generator, shape: tuple[int, int], texel_m: float, depth: float) -> Map:
-    """Factor around one with structure at several sizes, periodic along the second axis."""
-    total = np.zeros(shape)
+    """Factor around one with structure at several sizes, periodic along the second axis.
+
+    It draws from a child of `rng`, so that the resolution does not change what is drawn next.
+    """
+    rng, total = rng.spawn(1)[0], np.zeros(shape)
     for size_m, weight in ((0.25, 0.7), (0.8, 0.8), (2.4, 0.6)):
         step = max(1, round(size_m / texel_m))
         coarse = rng.standard_normal((-(-shape[0] // step), -(-shape[1] // step)))
@@ -62,11 +65,15 @@ def lamp_pools(texel_m: float, length: int) -> Map:
     return np.exp(-((gap / 7.0) ** 2))
 
 
+def _cells(extent_m: tuple[float, float], texel_m: float) -> slice:
+    return slice(round(extent_m[0] / texel_m), round(extent_m[1] / texel_m))
+
+
 def _paint_windows(
     rng: np.random.Generator,
     albedo: Map,
     glow: Map,
-    columns: slice,
+    extent_m: tuple[float, float],
     texel_m: float,
     roof_m: float,
     lit: float,
@@ -75,15 +82,15 @@ def _paint_windows(
     pitch = rng.uniform(1.8, 3.2)
     wide, tall = rng.uniform(0.45, 0.65) * pitch, rng.uniform(1.3, 2.0)
     sill = rng.uniform(0.7, 1.1)
-    first, last = columns.start * texel_m, columns.stop * texel_m
+    (first, last), columns = extent_m, _cells(extent_m, texel_m)
     glass = rng.uniform(0.03, 0.08)
     for floor in range(int(roof_m / FLOOR_M)):
         shop = floor == 0 and rng.random() < 0.6
         bottom = 0.5 if shop else floor * FLOOR_M + sill
-        y = slice(round(bottom / texel_m), round((bottom + (2.2 if shop else tall)) / texel_m))
+        y = _cells((bottom, bottom + (2.2 if shop else tall)), texel_m)
         at = first + 0.4
         while at + wide < last - 0.3:
-            z = slice(round(at / texel_m), round((at + wide) / texel_m))
+            z = _cells((at, at + wide), texel_m)
             albedo[y, z] = rng.uniform(0.3, 0.7) if rng.random() < 0.25 else glass
             if rng.random() < (0.7 if shop else 0.3):
                 glow[y, z] = lit * rng.uniform(0.2, 1.0) * (1.5 if shop else 1.0)
@@ -103,22 +110,22 @@ def front(
     length, rows = round(PERIOD_M / texel_m), round(FRONT_M / texel_m)
     albedo, glow = np.full((rows, length), 0.3), np.zeros((rows, length))
     roofs = np.zeros(length)
-    start = 0
-    while start < length:
-        stop = min(length, start + round(rng.uniform(6.0, 16.0) / texel_m))
-        if length - stop < round(4.0 / texel_m):
-            stop = length
-        columns = slice(start, stop)
+    start = 0.0
+    while start < PERIOD_M:
+        stop = start + rng.uniform(6.0, 16.0)
+        if PERIOD_M - stop < 4.0:
+            stop = PERIOD_M
+        columns = _cells((start, stop), texel_m)
         if rng.random() < 0.14:  # a garden wall or hedge between two buildings
             roof = rng.uniform(2.0, 3.5)
             albedo[:, columns] = rng.uniform(0.05, 0.12)
         else:
             roof = rng.uniform(6.5, FRONT_M - 1.0)
             albedo[:, columns] = np.exp(rng.uniform(np.log(0.12), np.log(0.65)))
-            _paint_windows(rng, albedo, glow, columns, texel_m, roof, lighting.window_lux)
+            _paint_windows(rng, albedo, glow, (start, stop), texel_m, roof, lighting.window_lux)
         roofs[columns] = roof
         edge = max(1, round(0.25 / texel_m))
-        albedo[:, start : start + edge] *= 0.45
+        albedo[:, columns.start : columns.start + edge] *= 0.45
         start = stop
     albedo *= mottle(rng, albedo.shape, texel_m, 0.22)
     height = (np.arange(rows)[:, None] + 0.5) * texel_m
