@@ -258,6 +258,7 @@ class DSECMini:
         if manifest.is_file() and read_json(manifest).get("parameters") == wanted:
             return root
         records = sorted(self._records(root), key=lambda record: str(record["name"]))
+        self._remove_others(root)
         for record in records:
             del record["description"]
         write_json(
@@ -287,9 +288,16 @@ class DSECMini:
             )
         )
 
+    def _remove_others(self, root: Path) -> None:
+        """Delete recordings of an earlier plan, which would otherwise join the splits."""
+        wanted = {root / recording.split / recording.name for recording in self.recordings()}
+        for record in root.glob(f"*/mini_*/{RECORD}"):
+            if record.parent not in wanted:
+                shutil.rmtree(record.parent)
+
     def _records(self, root: Path) -> list[dict[str, Any]]:
         recordings = self.recordings()
-        workers = min(self.workers or os.cpu_count() or 1, len(recordings))
+        workers = min(self.workers or _usable_cores(), len(recordings))
         jobs = [(recording, root) for recording in recordings]
         if workers <= 1:
             return self._follow(map(_write, jobs), len(jobs))
@@ -306,6 +314,12 @@ class DSECMini:
         )
         with Progress(*columns) as progress:
             return list(progress.track(records, total=total, description=f"dsec_mini {self.size}"))
+
+
+def _usable_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):  # a container may grant fewer than there are
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _write(job: tuple[Recording, Path]) -> dict[str, Any]:

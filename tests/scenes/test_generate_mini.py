@@ -149,6 +149,15 @@ def test_a_changed_parameter_replaces_the_old_recordings(tmp_path):
     assert len(list(tmp_path.rglob("*.png"))) == 3
 
 
+def test_recordings_of_an_earlier_plan_leave(tmp_path):
+    short = replace(TINY, sequences={"train": 2}, frames=2)
+    short.generate(tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    replace(short, sequences={"train": 1}).generate(tmp_path)
+    assert [path.name for path in (tmp_path / "train").iterdir()] == ["mini_train_000_day"]
+    assert (tmp_path / "notes.txt").exists()
+
+
 def test_at_least_a_fifth_of_each_split_is_night():
     for split, count in DSECMini().sequences.items():
         nights = [r.night for r in DSECMini().recordings() if r.split == split]
