@@ -1,0 +1,109 @@
+"""One step of training and evaluation, on a tiny detector and made-up windows."""
+
+from functools import partial
+
+import pytest
+import torch
+from torch.optim import SGD
+from torch.optim.lr_scheduler import ConstantLR
+
+from eqs.models import RVTDetector
+from eqs.tasks import DetectionTask
+from eqs.tasks.detection import ground_truth
+
+WINDOWS, SAMPLES, HEIGHT, WIDTH = 3, 2, 32, 32
+
+
+@pytest.fixture
+def task(monkeypatch: pytest.MonkeyPatch) -> DetectionTask:
+    for name in ("log", "log_dict"):  # there is no trainer to log to
+        monkeypatch.setattr(DetectionTask, name, lambda *_, **__: None)
+    torch.manual_seed(0)
+    model = RVTDetector("tiny", num_classes=2, in_channels=4, partition_split_32=1)
+    return DetectionTask(
+        model, partial(SGD, lr=0.1), partial(ConstantLR), ["car", "pedestrian"], ["own", "real"]
+    )
+
+
+def batch(seed: int = 0, *, first: bool = True) -> dict[str, torch.Tensor]:
+    generator = torch.Generator().manual_seed(seed)
+    shape = (WINDOWS, SAMPLES, 4, HEIGHT, WIDTH)
+    labels = torch.zeros(WINDOWS, SAMPLES, 2, 5)
+    labels[..., 0, :] = torch.tensor([1.0, 12.0, 16.0, 10.0, 8.0])
+    return {
+        "histograms": torch.randint(0, 5, shape, generator=generator, dtype=torch.uint8),
+        "labels": labels,
+        "labelled": torch.ones(WINDOWS, SAMPLES, dtype=torch.bool),
+        "first": torch.full((SAMPLES,), first),
+    }
+
+
+def test_the_loss_reaches_every_parameter(task: DetectionTask) -> None:
+    task.training_step(batch(), 0).backward()
+    without = [name for name, p in task.model.named_parameters() if p.grad is None]
+    assert without == []
+
+
+def test_states_are_carried_but_cut_from_the_gradient(task: DetectionTask) -> None:
+    task.train()
+    task.training_step(batch(), 0)
+    assert task._train_states is not None
+    assert not any(tensor.requires_grad for pair in task._train_states for tensor in pair)
+    with torch.no_grad():
+        task.eval()
+        carried = task.training_step(batch(1, first=False), 1)
+        task._train_states = None
+        fresh = task.training_step(batch(1), 1)
+    assert carried != fresh
+
+
+def test_a_first_sample_forgets_what_came_before(task: DetectionTask) -> None:
+    task.eval()
+    with torch.no_grad():
+        fresh = task.training_step(batch(1), 0)
+        task.training_step(batch(2), 1)
+        again = task.training_step(batch(1), 2)
+    torch.testing.assert_close(again, fresh, rtol=0, atol=0)
+
+
+def test_a_resumed_task_takes_its_states_back(task: DetectionTask) -> None:
+    task.training_step(batch(), 0)
+    checkpoint: dict[str, object] = {}
+    task.on_save_checkpoint(checkpoint)
+    states, task._train_states = task._train_states, None
+    task.on_load_checkpoint(checkpoint)
+    assert states is not None
+    assert task._train_states is not None
+    for before, after in zip(states, task._train_states, strict=True):
+        torch.testing.assert_close(after, before)
+
+
+def test_a_chunk_without_labels_detects_nothing_but_moves_the_states(task: DetectionTask) -> None:
+    task.eval()
+    silent = batch()
+    silent["labelled"] = torch.zeros_like(silent["labelled"])
+    with torch.no_grad():
+        assert task.detect(silent) == []
+    assert task._evaluation_states is not None
+
+
+def test_detections_do_not_depend_on_how_windows_are_chunked(task: DetectionTask) -> None:
+    task.eval()
+    whole = batch()
+    parts = [{**whole, "first": torch.full((SAMPLES,), index == 0)} for index in range(WINDOWS)]
+    for index, part in enumerate(parts):
+        for name in ("histograms", "labels", "labelled"):
+            part[name] = whole[name][index : index + 1]
+    with torch.no_grad():
+        together = task.detect(whole)
+        apart = [found for part in parts for found in task.detect(part)]
+    assert len(together) == len(apart) == WINDOWS * SAMPLES
+    for a, b in zip(together, apart, strict=True):
+        torch.testing.assert_close(a["scores"], b["scores"], rtol=1e-4, atol=1e-6)
+
+
+def test_ground_truth_turns_rows_into_corners_and_drops_padding() -> None:
+    rows = torch.tensor([[1.0, 10.0, 20.0, 4.0, 6.0], [0.0, 0.0, 0.0, 0.0, 0.0]])
+    truth = ground_truth(rows)
+    assert truth["boxes"].tolist() == [[8.0, 17.0, 12.0, 23.0]]
+    assert truth["labels"].tolist() == [1]
