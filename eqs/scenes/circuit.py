@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
+Line = tuple[float, float, float, float]  # start, slope and leak per us, length of the step in us
+Place = tuple[float, float, float]  # start of the step in us, column, row
 
 
 class Circuit(NamedTuple):
@@ -71,6 +73,41 @@ def _photoreceptor(
 
 
 @njit(cache=True, error_model="numpy")
+def _fire(
+    line: Line,
+    memory: float,
+    now: float,
+    on: float,
+    off: float,
+    circuit: Circuit,
+    draw: np.uint64,
+    place: Place,
+    events: Array,
+    count: int,
+) -> tuple[float, float, int]:
+    """Find the crossings of one pixel from `now` to the end of the step; memory, time, count."""
+    start, rise, leak, step_us = line
+    drift = rise + leak
+    serial = np.uint64(0)
+    while now < step_us:
+        ahead = (on if drift > 0.0 else -off) - (start + rise * now - memory)
+        wait = max(ahead / drift, 0.0) if drift != 0.0 else step_us
+        if now + wait >= step_us:
+            return memory - leak * (step_us - now), step_us, count
+        now += wait
+        if count < len(events):
+            delay = circuit.latency_us + circuit.jitter_us * bell(mix(draw, serial))
+            events[count, 0] = place[0] + now + max(delay, 0.0)
+            events[count, 1], events[count, 2] = place[1], place[2]
+            events[count, 3] = 1.0 if drift > 0.0 else 0.0
+        count += 1
+        serial += np.uint64(1)
+        now += circuit.refractory_us
+        memory = start + rise * now  # overwritten after a reset that outlasts the step
+    return memory, now, count
+
+
+@njit(cache=True, error_model="numpy")
 def advance(
     state: Picture,
     picture: Picture,
@@ -89,7 +126,6 @@ def advance(
     """
     count, pixels = 0, len(picture)
     step_us = circuit.step_s * 1e6
-    start_us = step_index * step_us
     for i in range(pixels):
         draw = mix(key, np.uint64(step_index * pixels + i))
         y0 = float(state[0, i])
@@ -104,33 +140,14 @@ def advance(
         if now > 0.0:
             memory = y0 + rise * now  # leaving reset, the pixel memorises what it sees then
         on, off = float(thresholds[0, i]), float(thresholds[1, i])
-        drift = rise + leak
         rest = step_us - now
-        change = y0 + rise * now - memory + drift * rest
+        change = y0 + rise * now - memory + (rise + leak) * rest
         if -off < change < on:  # by far the most pixels: straight lines cannot cross in between
             state[2, i], state[3, i] = memory - leak * rest, 0.0
             continue
-        serial = 0
-        while now < step_us:
-            ahead = (on if drift > 0.0 else -off) - (y0 + rise * now - memory)
-            wait = ahead / drift if drift != 0.0 else step_us
-            wait = max(wait, 0.0)
-            if now + wait >= step_us:
-                memory -= leak * (step_us - now)
-                now = step_us
-                break
-            now += wait
-            if count < len(events):
-                delay = circuit.latency_us
-                delay += circuit.jitter_us * bell(mix(draw, np.uint64(serial)))
-                events[count, 0] = start_us + now + max(delay, 0.0)
-                events[count, 1], events[count, 2] = i % width, i // width
-                events[count, 3] = 1.0 if drift > 0.0 else 0.0
-            count += 1
-            serial += 1
-            now += circuit.refractory_us
-            if now < step_us:
-                memory = y0 + rise * now
+        line = (y0, rise, leak, step_us)
+        place = (step_index * step_us, float(i % width), float(i // width))
+        memory, now, count = _fire(line, memory, now, on, off, circuit, draw, place, events, count)
         state[2, i], state[3, i] = memory, max(now - step_us, 0.0)
     return count
 

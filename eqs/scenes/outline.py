@@ -298,6 +298,40 @@ def _grow_box(box: Array, corners: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def _add_actor(
+    polygons: Polygons,
+    used: int,
+    box: Array,
+    actor: Array,
+    parts: Array,
+    time_s: float,
+    camera: Array,
+    light: Array,
+) -> int:
+    """Add one actor's parts and grow its box, unless it is out of sight."""
+    heading = actor[HEADING]
+    x = actor[X] + actor[SPEED] * time_s * math.sin(heading)
+    z = actor[Z] + actor[SPEED] * time_s * math.cos(heading)
+    dx, dz = x - camera[CAM_X], z - camera[CAM_Z]
+    depth = dx * camera[CAM_SIN] + dz * camera[CAM_COS]
+    actor[DEPTH_SORT] = -depth
+    beside = abs(dx * camera[CAM_COS] - dz * camera[CAM_SIN])
+    widest = depth * camera[MID_COLUMN] / camera[FOCAL] + 1.5 * REACH_M
+    if not -REACH_M < depth < FAR_M or beside > widest:
+        return used
+    lit = _local_light(x, z, max(depth, 0.5), camera, light)
+    fade = light[HAZE_REACH] / (light[HAZE_REACH] + max(depth, 0.0))
+    for p in range(len(parts)):
+        part = parts[p]
+        if used + 12 > len(polygons.marks) or _hidden_side(part[SEEN_FROM], heading, lit):
+            continue
+        used = _add_part(polygons, used, part, x, z, heading, time_s, camera, light, lit, fade)
+        if part[MODE] == SOLID:
+            _grow_box(box, polygons.scratch[0])
+    return used
+
+
+@njit(cache=True, error_model="numpy")
 def outline_actors(
     polygons: Polygons,
     actors: Array,
@@ -319,31 +353,12 @@ def outline_actors(
         light: light vector.
     """
     used = 0
-    half_view = camera[MID_COLUMN] / camera[FOCAL]
     for i in range(len(actors)):
-        actor = actors[i]
-        heading = actor[HEADING]
-        x = actor[X] + actor[SPEED] * time_s * math.sin(heading)
-        z = actor[Z] + actor[SPEED] * time_s * math.cos(heading)
-        dx, dz = x - camera[CAM_X], z - camera[CAM_Z]
-        depth = dx * camera[CAM_SIN] + dz * camera[CAM_COS]
-        actor[DEPTH_SORT] = -depth
-        polygons.spans[i, 0] = used
         box = polygons.boxes[i]
         box[0], box[1], box[2], box[3] = 1e9, 1e9, -1e9, -1e9
-        beside = abs(dx * camera[CAM_COS] - dz * camera[CAM_SIN])
-        if -REACH_M < depth < FAR_M and beside < depth * half_view + 1.5 * REACH_M:
-            lit = _local_light(x, z, max(depth, 0.5), camera, light)
-            fade = light[HAZE_REACH] / (light[HAZE_REACH] + max(depth, 0.0))
-            for p in range(first[i], first[i + 1]):
-                part = parts[p]
-                if used + 12 > len(polygons.marks) or _hidden_side(part[SEEN_FROM], heading, lit):
-                    continue
-                used = _add_part(
-                    polygons, used, part, x, z, heading, time_s, camera, light, lit, fade
-                )
-                if part[MODE] == SOLID:
-                    _grow_box(box, polygons.scratch[0])
+        polygons.spans[i, 0] = used
+        own = parts[first[i] : first[i + 1]]
+        used = _add_actor(polygons, used, box, actors[i], own, time_s, camera, light)
         polygons.spans[i, 1] = used
     polygons.order[:] = np.argsort(actors[:, DEPTH_SORT])
     return used

@@ -51,9 +51,12 @@ Picture = NDArray[np.float32]
 Span = tuple[int, int]
 Position = tuple[int, float, float]  # cell, fraction of it, whole periods
 
-# What painting the fronts notes about each column for the ground: direction, row of the horizon,
-# first row of the ground, light of the headlights relative to the ambient light.
-DIR_X, DIR_Z, SHIFT, BASE, GLOW = range(5)
+# What one column of pixels has in common: direction, row of the horizon, depth of the front, first
+# row of the ground, light of the headlights relative to the ambient light.
+DIR_X, DIR_Z, SHIFT, DEPTH, BASE, GLOW = range(6)
+COLUMN_FACTS: Final = 6
+
+NARROW_PX: Final = 5  # looking for spans in a narrower polygon costs more than it saves
 
 VISTA_M: Final = 160.0  # beyond this depth the street ends in haze
 
@@ -127,7 +130,7 @@ def paint_street(
         surfaces: the street's textures.
         camera: camera vector.
         light: light vector.
-        columns: scratch, shape (W, 5).
+        columns: scratch, shape (W, COLUMN_FACTS).
     """
     _paint_fronts(image, surfaces, camera, light, columns)
     _paint_ground(image, surfaces, camera, light, columns)
@@ -137,58 +140,63 @@ def paint_street(
 def _paint_fronts(
     image: Picture, surfaces: Surfaces, camera: Array, light: Array, columns: Array
 ) -> None:
-    """Paint sky and fronts column by column, and note where the ground begins in each.
-
-    Pixels of one column look along one vertical plane, so they share the position along the
-    street; and the bottom of one pixel is the top of the next.
-    """
-    height, width = image.shape
-    focal, per_m = camera[FOCAL], surfaces.texels_per_m
-    period = surfaces.road.shape[0] - 1
-    for column in range(width):
+    """Paint sky and fronts column by column, and note where the ground begins in each."""
+    focal = camera[FOCAL]
+    for column in range(image.shape[1]):
         a = (column + 0.5 - camera[MID_COLUMN]) / focal
         dir_x = a * camera[CAM_COS] + camera[CAM_SIN]
-        dir_z = camera[CAM_COS] - a * camera[CAM_SIN]
-        shift = camera[MID_ROW] + focal * (camera[CAM_PITCH] + camera[CAM_ROLL] * a)
-        wall = surfaces.right if dir_x > 0.0 else surfaces.left
+        aim = columns[column]
+        aim[DIR_X], aim[DIR_Z] = dir_x, camera[CAM_COS] - a * camera[CAM_SIN]
+        aim[SHIFT] = camera[MID_ROW] + focal * (camera[CAM_PITCH] + camera[CAM_ROLL] * a)
         offset = math.copysign(surfaces.half_street_m, dir_x) - camera[CAM_X]
-        depth = min(offset / dir_x if abs(dir_x) > 1e-9 else VISTA_M, VISTA_M)
-        haze = depth / (depth + light[HAZE_REACH])
-        haze += (1.0 - haze) * max(0.0, 4.0 * depth / VISTA_M - 3.0)
-        # Share of the front's length seen by this column: |dz/da| = |offset| / dir_x^2.
-        half = 0.5 * depth / max(abs(dir_x), 1e-3) / focal * per_m
-        half = min(max(half, 0.5), 0.2 * period)
-        middle = (camera[CAM_Z] + depth * dir_z) * per_m
-        lower = _wrapped(middle - half, period, 1.0 / period)
-        upper = _wrapped(middle + half, period, 1.0 / period)
-        scale = depth / focal * per_m  # texels of front per row
-        eye = camera[CAM_Y] * per_m
-        side = 1 if dir_x > 0.0 else 0
-        roof = _strip_integral(surfaces.roofs, side, lower, upper) / (2.0 * half)
-        roof_row, base_row = shift - (roof - eye) / scale, shift + eye / scale
-        azimuth = math.atan2(dir_x, dir_z)
-        clouds = (math.sin(7.0 * azimuth + 1.3), 2.0 * math.sin(17.0 * azimuth + 0.4))
-        columns[column, DIR_X], columns[column, DIR_Z] = dir_x, dir_z
-        columns[column, SHIFT], columns[column, BASE] = shift, base_row
-        columns[column, GLOW] = light[BEAM] / light[AMBIENT] * math.exp(-((a / 0.4) ** 2))
-        above = -1.0  # integral of the front up to the top of the row, once known
-        for row in range(min(height, max(0, math.ceil(base_row)))):
-            value = 0.0
-            sky_share = min(max(roof_row - row, 0.0), 1.0)
-            share = 1.0 - sky_share - min(max(row + 1.0 - base_row, 0.0), 1.0)
-            if sky_share > 0.0:
-                slope = (shift - (row + 0.5)) / focal
-                value += sky_share * _sky_radiance(slope, clouds, surfaces.sky)
-            if share > 1e-6:
-                top = min(eye - (row - shift) * scale, roof)
-                bottom = max(eye - (row + 1.0 - shift) * scale, 0.0)
-                if above < 0.0:
-                    above = _area_integral(wall, top, lower, upper)
-                below = _area_integral(wall, bottom, lower, upper)
-                front = (above - below) / (2.0 * half * max(top - bottom, 1e-9))
-                above = below
-                value += share * (front * (1.0 - haze) + light[HAZE] * haze)
-            image[row, column] = value
+        aim[DEPTH] = min(offset / dir_x if abs(dir_x) > 1e-9 else VISTA_M, VISTA_M)
+        aim[BASE] = aim[SHIFT] + camera[CAM_Y] * focal / aim[DEPTH]
+        aim[GLOW] = light[BEAM] / light[AMBIENT] * math.exp(-((a / 0.4) ** 2))
+        _paint_front(image, column, surfaces, camera, light, aim)
+
+
+@njit(cache=True, error_model="numpy")
+def _paint_front(
+    image: Picture, column: int, surfaces: Surfaces, camera: Array, light: Array, aim: Array
+) -> None:
+    """Paint sky and front in one column.
+
+    Its pixels look along one vertical plane, so they share the position along the street; and
+    the bottom of one pixel is the top of the next.
+    """
+    dir_x, depth, shift, focal = aim[DIR_X], aim[DEPTH], aim[SHIFT], camera[FOCAL]
+    per_m, period = surfaces.texels_per_m, surfaces.road.shape[0] - 1
+    wall, side = (surfaces.right, 1) if dir_x > 0.0 else (surfaces.left, 0)
+    # Share of the front's length seen by this column: |dz/da| = |offset| / dir_x^2.
+    half = min(max(0.5 * depth / max(abs(dir_x), 1e-3) / focal * per_m, 0.5), 0.2 * period)
+    middle = (camera[CAM_Z] + depth * aim[DIR_Z]) * per_m
+    lower = _wrapped(middle - half, period, 1.0 / period)
+    upper = _wrapped(middle + half, period, 1.0 / period)
+    scale, eye = depth / focal * per_m, camera[CAM_Y] * per_m  # texels per row, and of the eye
+    roof = _strip_integral(surfaces.roofs, side, lower, upper) / (2.0 * half)
+    roof_row = shift - (roof - eye) / scale
+    haze = depth / (depth + light[HAZE_REACH])
+    haze += (1.0 - haze) * max(0.0, 4.0 * depth / VISTA_M - 3.0)
+    azimuth = math.atan2(dir_x, aim[DIR_Z])
+    clouds = (math.sin(7.0 * azimuth + 1.3), 2.0 * math.sin(17.0 * azimuth + 0.4))
+    above = -1.0  # integral of the front up to the top of the row, once known
+    for row in range(min(image.shape[0], max(0, math.ceil(aim[BASE])))):
+        value = 0.0
+        sky_share = min(max(roof_row - row, 0.0), 1.0)
+        share = 1.0 - sky_share - min(max(row + 1.0 - aim[BASE], 0.0), 1.0)
+        if sky_share > 0.0:
+            slope = (shift - (row + 0.5)) / focal
+            value += sky_share * _sky_radiance(slope, clouds, surfaces.sky)
+        if share > 1e-6:
+            top = min(eye - (row - shift) * scale, roof)
+            bottom = max(eye - (row + 1.0 - shift) * scale, 0.0)
+            if above < 0.0:
+                above = _area_integral(wall, top, lower, upper)
+            below = _area_integral(wall, bottom, lower, upper)
+            front = (above - below) / (2.0 * half * max(top - bottom, 1e-9))
+            above = below
+            value += share * (front * (1.0 - haze) + light[HAZE] * haze)
+        image[row, column] = value
 
 
 @njit(cache=True, error_model="numpy")
@@ -245,7 +253,7 @@ def _row_span(edges: Array, count: int, y: float, margin: float, x0: int, x1: in
         else:
             high = min(high, -rest / a + 0.5)
     first = min(max(math.ceil(low), x0), x1)
-    return first, max(first, min(math.ceil(high), x1))
+    return first, max(first, min(math.floor(high), x1))
 
 
 @njit(cache=True, error_model="numpy")
@@ -263,6 +271,22 @@ def _join(layers: Array, row: int, column: int, join: int, c: float, values: Arr
 
 
 @njit(cache=True, error_model="numpy")
+def _fill(layers: Array, row: int, begin: int, end: int, join: int, values: Array) -> None:
+    """Lay the whole of one polygon over pixels that it covers entirely."""
+    if join == SOLID:
+        for column in range(begin, end):
+            layers[0, row, column] = values[COLOUR]
+            layers[1, row, column] = 1.0
+            layers[2, row, column] = 1.0
+    elif join == ATOP:
+        for column in range(begin, end):
+            layers[0, row, column] = values[COLOUR] * layers[1, row, column]
+    else:
+        for column in range(begin, end):
+            layers[1, row, column] += values[STRENGTH] * (1.0 - layers[1, row, column])
+
+
+@njit(cache=True, error_model="numpy")
 def _paint_actor(layers: Array, polygons: Polygons, first: int, last: int) -> None:
     """Paint one actor into premultiplied radiance, opacity and solid coverage, (3, H, W)."""
     for p in range(first, last):
@@ -270,15 +294,21 @@ def _paint_actor(layers: Array, polygons: Polygons, first: int, last: int) -> No
         count, join, ring = marks[EDGES], marks[JOIN], values[RING]
         for row in range(marks[Y0], marks[Y1]):
             y = row + 0.5
-            begin, end = _row_span(edges, count, y, -0.5, marks[X0], marks[X1])
-            inner, outer = _row_span(edges, count, y, 0.5, begin, end)
-            for column in range(begin, end):
-                if inner <= column < outer and ring == 0.0:
-                    c = 1.0
-                else:
-                    c = coverage(edges, count, column + 0.5, y, 0.0)
-                    if ring > 0.0:
-                        c -= coverage(edges, count, column + 0.5, y, ring)
+            begin, end = int(marks[X0]), int(marks[X1])
+            inner = outer = end
+            if end - begin > NARROW_PX:
+                begin, end = _row_span(edges, count, y, -0.5, begin, end)
+                inner = outer = end
+                if ring == 0.0:
+                    inner, outer = _row_span(edges, count, y, 0.5, begin, end)
+            for column in range(begin, inner):
+                c = coverage(edges, count, column + 0.5, y, 0.0)
+                if ring > 0.0:
+                    c -= coverage(edges, count, column + 0.5, y, ring)
+                _join(layers, row, column, join, c, values)
+            _fill(layers, row, inner, outer, join, values)
+            for column in range(outer, end):
+                c = coverage(edges, count, column + 0.5, y, 0.0)
                 _join(layers, row, column, join, c, values)
 
 

@@ -161,6 +161,8 @@ class ReferenceStream:
         self._key, self._phase_seed = np.uint64(keys[0]), int(keys[1])
         # Rows: photoreceptor output, its slope per second, memorised value, refractory us left.
         self._state = np.zeros((4, count), np.float32)
+        # Buffers that a step reuses: the state to be, and room for the step's events.
+        self._trial, self._room = self._state.copy(), np.empty((count, 4))
         self._steps = -1
         self._pending = np.zeros((0, 4))
         self._bus = np.array([-1.0, -1.0])  # when the readout is free, and the row it serves
@@ -201,11 +203,10 @@ class ReferenceStream:
         self._state[2] = self._state[0] - on + place * (on + off)
 
     def _advance(self, picture: NDArray[np.float32]) -> Array:
-        room = 4 * len(picture)
         while True:
-            trial, events = self._state.copy(), np.empty((room, 4))
+            np.copyto(self._trial, self._state)
             count = advance(
-                trial,
+                self._trial,
                 picture,
                 self._thresholds,
                 self._leak_per_us,
@@ -213,12 +214,12 @@ class ReferenceStream:
                 self._key,
                 self._steps,
                 self._width,
-                events,
+                self._room,
             )
-            if count <= room:
-                self._state = trial
-                return events[:count]
-            room = 2 * count
+            if count <= len(self._room):
+                self._state, self._trial = self._trial, self._state
+                return self._room[:count].copy()
+            self._room = np.empty((2 * count, 4))
 
     def _deliver(self, until_us: float) -> Events:
         """Pass on the requests made before `until_us`, in the order they were made."""

@@ -22,7 +22,7 @@ from eqs.scenes.optics import (
     MID_ROW,
 )
 from eqs.scenes.outline import Polygons, outline_actors
-from eqs.scenes.render import measure_actors, paint_actors, paint_street
+from eqs.scenes.render import COLUMN_FACTS, measure_actors, paint_actors, paint_street
 
 FIELD_OF_VIEW_RAD = np.deg2rad(60.0)
 
@@ -96,7 +96,7 @@ class DrivingWorld:
         self._first = np.cumsum([0] + [len(actor.parts) for actor in self.actors])
         self._polygons = Polygons.room_for(len(self.actors))
         self._layers = np.zeros((3, height, width))
-        self._columns = np.zeros((width, 5))
+        self._columns = np.zeros((width, COLUMN_FACTS))
 
     def camera(self, t_us: float) -> NDArray[np.float64]:
         """The camera vector at a time in microseconds since the start."""

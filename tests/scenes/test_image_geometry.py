@@ -1,7 +1,10 @@
 import numpy as np
 import pytest
 
+from eqs.scenes.actors import SOLID
 from eqs.scenes.optics import convex_hull, coverage, project, set_edges, signed_area
+from eqs.scenes.outline import EDGES, JOIN, X0, X1, Y0, Y1, Polygons
+from eqs.scenes.render import _paint_actor
 
 
 def camera(**change):
@@ -98,3 +101,24 @@ def test_total_coverage_of_a_large_polygon_is_its_area():
     edges, count = edges_of(corners)
     total = sum(coverage(edges, count, x + 0.5, y + 0.5, 0.0) for x in range(32) for y in range(32))
     assert total == pytest.approx(abs(signed_area(np.array(corners), 4)), rel=0.01)
+
+
+@pytest.mark.parametrize("size", [1.5, 6.0, 25.0])
+def test_a_filled_polygon_has_the_coverage_of_its_pixels(size):
+    # Filling by row spans is only a faster way to the coverage of every single pixel.
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        polygons, layers = Polygons.room_for(1), np.zeros((3, 32, 40))
+        angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 5))
+        corners = np.stack([np.cos(angles), np.sin(angles)], axis=1) * size / 2.0
+        corners += rng.uniform(5.0, 25.0, 2)
+        count = set_edges(corners, 5, polygons.edges[0])
+        polygons.marks[0, [EDGES, JOIN, X0, X1, Y0, Y1]] = (count, SOLID, 0, 40, 0, 32)
+        polygons.values[0] = (7.0, 0.0, 1.0)
+        _paint_actor(layers, polygons, 0, 1)
+        expected = [
+            [coverage(polygons.edges[0], count, x + 0.5, y + 0.5, 0.0) for x in range(40)]
+            for y in range(32)
+        ]
+        np.testing.assert_allclose(layers[1], expected, atol=1e-9)
+        np.testing.assert_allclose(layers[0], 7.0 * np.array(expected), atol=1e-9)
