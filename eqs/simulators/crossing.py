@@ -13,6 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from eqs.simulators.ordering import event_key
+
 # A signal counts as having reached a level it misses by this share of a threshold, so that a step
 # of exactly n thresholds gives n events whichever way the sum was rounded.
 RELATIVE_TOLERANCE = 1e-9
@@ -87,3 +89,64 @@ def crossing_share(level: float, first: float, last: float) -> float:
 def officially_crossed(level: float, first: float, last: float, sign: int) -> bool:
     """Whether the official rule accepts a level for a signal moving from `first` to `last`."""
     return sign * (level - first) > 0.0 and sign * (last - level) >= 0.0
+
+
+@njit(cache=True, nogil=True)
+def fire_levels(
+    chosen: NDArray[np.int32],
+    passed: NDArray[np.int64],
+    above: NDArray[np.float64],
+    moved: NDArray[np.float64],
+    last_us: NDArray[np.float64],
+    on: NDArray[np.float64],
+    off: NDArray[np.float64],
+    refractory_us: float,
+    keeps_contrast: bool,
+    start_us: int,
+    span_us: int,
+    keys: NDArray[np.int64],
+) -> int:
+    """Fire the levels between `above` and `moved` by the robust rule, and take them from `moved`.
+
+    Args:
+        chosen: the pixels that fire, see `firing_pixels`.
+        passed: how many levels each of them has passed, signed.
+        above: signal above reference of each pixel when the interval starts.
+        moved: the same when it ends; reduced by what has fired.
+        last_us: time of each pixel's last event; updated.
+        on: threshold of each pixel.
+        off: the same for OFF, positive.
+        refractory_us: dead time after an event.
+        keeps_contrast: whether a crossing within the dead time waits for its end, or is lost.
+        start_us: start of the interval.
+        span_us: its length.
+        keys: buffer for the events, large enough for all levels passed.
+
+    Returns:
+        The number of events.
+    """
+    count = 0
+    for index in range(chosen.size):
+        pixel = chosen[index]
+        polarity = 1 if passed[index] > 0 else 0
+        step = on[pixel] if polarity else -off[pixel]
+        first, last, previous_us = above[pixel], moved[pixel], last_us[pixel] - start_us
+        settled = 0
+        for ordinal in range(1, abs(passed[index]) + 1):
+            offset_us = crossing_share(ordinal * step, first, last) * span_us
+            earliest_us = previous_us + refractory_us
+            if offset_us < earliest_us:
+                if not keeps_contrast:
+                    settled = ordinal
+                    continue
+                # The signal of the interval is still beyond the level when the dead time ends.
+                offset_us = earliest_us
+            if offset_us > span_us:
+                break
+            previous_us = offset_us
+            settled = ordinal
+            keys[count] = event_key(start_us + int(offset_us), pixel, polarity)
+            count += 1
+        moved[pixel] = last - settled * step
+        last_us[pixel] = start_us + previous_us
+    return count

@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+MICROSECONDS = 1e-6
+
 
 def log_intensity(levels: NDArray[np.float64], offset: float) -> NDArray[np.float64]:
     """Natural log of the intensity, 0..1, above an offset that keeps black finite.
@@ -41,3 +43,26 @@ def relative_light(levels: NDArray[np.float64]) -> NDArray[np.float64]:
         1.0
     """
     return (levels + 20.0) / 275.0
+
+
+def filter_share(
+    levels: NDArray[np.float64], cutoff_hz: float, span_us: int
+) -> NDArray[np.float64]:
+    """Share of the way to the new signal that a first-order filter goes within an interval.
+
+    Euler's step `min(1, q 2 pi cutoff dt)` of v2e and Prophesee, whose bandwidth grows with the
+    light `q`; at frames slower than the filter it goes all the way.
+
+    Args:
+        levels: grey levels, 0..255.
+        cutoff_hz: bandwidth at full light, 0 for no filter.
+        span_us: length of the interval.
+
+    Example:
+        >>> filter_share(np.array([0.0, 255.0]), 10.0, 10_000).round(3).tolist()
+        [0.046, 0.628]
+    """
+    if cutoff_hz == 0:
+        return np.ones_like(levels)
+    turns = 2 * math.pi * cutoff_hz * span_us * MICROSECONDS
+    return np.minimum(1.0, relative_light(levels) * turns)

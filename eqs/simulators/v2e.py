@@ -5,18 +5,13 @@ Hu, Liu and Delbruck, "v2e: From Video Frames to Realistic DVS Events", CVPR Wor
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from eqs.frames import GreyImage
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
-from eqs.simulators.photoreceptor import relative_light
 from eqs.simulators.v2e_faithful import FaithfulV2EPixels
-from eqs.simulators.v2e_pixels import MICROSECONDS, V2EPixels
+from eqs.simulators.v2e_pixels import V2EPixels
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,15 +97,3 @@ class V2E(Simulator):
         """The pixels after the first frame."""
         kind = FaithfulV2EPixels if self.mode == "faithful" else V2EPixels
         return kind(self, image, sequence)
-
-    def filter_share(self, levels: NDArray[np.float64], span_us: int) -> NDArray[np.float64]:
-        """Share of the way to the new signal that the filter goes within the interval."""
-        if self.cutoff_hz == 0:
-            return np.ones_like(levels)
-        turns = 2 * math.pi * self.cutoff_hz * span_us * MICROSECONDS
-        return np.minimum(1.0, relative_light(levels) * turns)
-
-    def shot_events(self, levels: NDArray[np.float64], span_us: int) -> NDArray[np.float64]:
-        """Expected shot-noise events of one polarity within the interval."""
-        full = 0.5 * self.shot_noise_hz * span_us * MICROSECONDS
-        return full * (1.0 - 0.75 * relative_light(levels))

@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.base import Interval
-from eqs.simulators.crossing import crossing_share, firing_pixels
-from eqs.simulators.ordering import Fired, event_key, with_room
-from eqs.simulators.photoreceptor import lin_log
+from eqs.simulators.crossing import fire_levels, firing_pixels
+from eqs.simulators.noise import scatter_noise, shot_events
+from eqs.simulators.ordering import Fired, with_room
+from eqs.simulators.photoreceptor import MICROSECONDS, filter_share, lin_log
 from eqs.simulators.randomness import (
     NORMAL_QUANTILES,
     draw_key,
     normal_map,
     normal_quantile,
-    poisson,
-    uniform,
     uniform_map,
     word_at,
 )
@@ -27,8 +26,6 @@ from eqs.simulators.thresholds import threshold_map
 
 if TYPE_CHECKING:
     from eqs.simulators.v2e import V2E
-
-MICROSECONDS = 1e-6
 
 
 class V2EPixels:
@@ -77,8 +74,9 @@ class V2EPixels:
         """Events of one interval."""
         model = self.model
         signal = lin_log(image.levels, model.knee_level).astype(self.precision)
-        share = model.filter_share(image.levels, interval.span_us).astype(self.precision)
-        shot = model.shot_events(image.levels, interval.span_us)
+        share = filter_share(image.levels, model.cutoff_hz, interval.span_us)
+        shot = shot_events(image.levels, model.shot_noise_hz, interval.span_us)
+        share = share.astype(self.precision)
         self.keys, count = self._fire(image.codes, signal, share, shot, interval)
         return self.keys[:count]
 
@@ -108,7 +106,7 @@ class V2EPixels:
         )
         chosen, total = firing_pixels(self.moved, self.on, self.off, self.chosen, self.passed)
         keys = with_room(self.keys, total)
-        count = _fire_continuously(
+        count = fire_levels(
             self.chosen[:chosen],
             self.passed,
             self.above,
@@ -117,6 +115,7 @@ class V2EPixels:
             self.on,
             self.off,
             float(model.refractory_us),
+            True,
             interval.start_us,
             interval.span_us,
             keys,
@@ -124,7 +123,7 @@ class V2EPixels:
         self.above, self.moved = self.moved, self.above
         if model.shot_noise_hz == 0:
             return keys, count
-        return _scatter_shot_noise(
+        return scatter_noise(
             codes,
             shot,
             self.above,
@@ -163,74 +162,3 @@ def _move(
         for pixel in range(codes.size):
             jitter = leak_jitter * normal_quantile(word_at(noise_key, pixel), quantiles)
             moved[pixel] -= leak_per_second[pixel] * seconds * jitter
-
-
-@njit(cache=True, nogil=True)
-def _fire_continuously(
-    chosen: NDArray[np.int32],
-    passed: NDArray[np.int64],
-    above: NDArray[np.float64],
-    moved: NDArray[np.float64],
-    last_us: NDArray[np.float64],
-    on: NDArray[np.float64],
-    off: NDArray[np.float64],
-    refractory_us: float,
-    start_us: int,
-    span_us: int,
-    keys: NDArray[np.int64],
-) -> int:
-    """Fire the levels between `above` and `moved`, and take them from `moved`."""
-    count = 0
-    for index in range(chosen.size):
-        pixel = chosen[index]
-        polarity = 1 if passed[index] > 0 else 0
-        step = on[pixel] if polarity else -off[pixel]
-        first, last, previous_us = above[pixel], moved[pixel], last_us[pixel] - start_us
-        fired = 0
-        for ordinal in range(1, abs(passed[index]) + 1):
-            offset_us = crossing_share(ordinal * step, first, last) * span_us
-            # A crossing within the refractory period fires when that ends, as the signal of the
-            # interval is still beyond the level then.
-            offset_us = max(offset_us, previous_us + refractory_us)
-            if offset_us > span_us:
-                break
-            previous_us = offset_us
-            fired = ordinal
-            keys[count] = event_key(start_us + int(offset_us), pixel, polarity)
-            count += 1
-        moved[pixel] = last - fired * step
-        last_us[pixel] = start_us + previous_us
-    return count
-
-
-@njit(cache=True, nogil=True)
-def _scatter_shot_noise(
-    codes: NDArray[Any],
-    shot: NDArray[np.float64],
-    above: NDArray[np.float64],
-    on: NDArray[np.float64],
-    off: NDArray[np.float64],
-    nominal: tuple[float, float],
-    noise_key: np.uint64,
-    start_us: int,
-    span_us: int,
-    keys: NDArray[np.int64],
-    count: int,
-) -> Fired:
-    """Poisson numbers of noise events at random times; such pixels forget pending contrast."""
-    for pixel in range(codes.size):
-        expected_on = shot[codes[pixel]] * nominal[0] / on[pixel]
-        expected_off = shot[codes[pixel]] * nominal[1] / off[pixel]
-        word = word_at(noise_key, pixel)
-        number = poisson(word, expected_on + expected_off)
-        if number == 0:
-            continue
-        above[pixel] = 0.0
-        on_share = expected_on / (expected_on + expected_off)
-        keys = with_room(keys, count + number)
-        for ordinal in range(number):
-            time_us = start_us + int(uniform(word_at(word, 2 * ordinal)) * span_us)
-            polarity = 1 if uniform(word_at(word, 2 * ordinal + 1)) < on_share else 0
-            keys[count] = event_key(time_us, pixel, polarity)
-            count += 1
-    return keys, count
