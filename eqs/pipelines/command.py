@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import logging
 import os
+import warnings
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -24,6 +25,7 @@ def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig],
 
     @functools.wraps(command)
     def run(cfg: DictConfig) -> Result:
+        quiet_libraries()
         try:
             return command(cfg)
         except (ValueError, OSError, InstantiationException, OmegaConfBaseException) as error:
@@ -42,3 +44,15 @@ def sentence(error: BaseException) -> str:
         key = f" (config key {where[1].strip()})" if len(where) > 1 else ""
         return sentence(error.__cause__) + key
     return str(error) or type(error).__name__
+
+
+def quiet_libraries() -> None:
+    """Silence what Lightning says about itself; what it says about the training stays."""
+    for message in (
+        ".*isinstance.treespec",  # torch and Lightning disagree about a name
+        ".*does not have many workers",  # windows are binned faster than a laptop trains
+        ".*smaller than the logging interval",
+    ):
+        warnings.filterwarnings("ignore", message=message)
+    for name in ("lightning.pytorch.utilities.rank_zero", "lightning.fabric.utilities.seed"):
+        logging.getLogger(name).setLevel(logging.WARNING)

@@ -1,0 +1,110 @@
+"""The whole chain through the real configuration, on a world of a few tiny sequences."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from hydra import compose, initialize_config_dir
+from lightning.pytorch.callbacks import Callback
+from omegaconf import DictConfig, open_dict
+
+import eqs
+from eqs.pipelines import evaluate, register_resolvers, train
+from eqs.pipelines.runs import finished_runs
+
+CONFIGS = Path(eqs.__file__).parent.parent / "configs"
+
+class Interrupted(Exception):
+    """Stands for a power cut."""
+
+
+class PowerCut(Callback):
+    """Stops the training in the middle of its second epoch."""
+
+    def on_train_batch_end(self, trainer, *_):
+        if trainer.global_step == 3:
+            raise Interrupted
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("study")
+
+
+def configured(place: Path, *overrides: str, name: str = "train") -> DictConfig:
+    register_resolvers()
+    paths = [f"paths.{key}={place / key}" for key in ("datasets", "simulated", "runs", "results")]
+    small = [
+        "experiment=smoke",
+        "data.size=64x48",
+        "data.generator.frames=8",
+        "data.generator.sequences={train: 2, val: 1, test: 2}",
+        "data.generator.workers=1",
+        "recipe.steps_per_epoch=2",
+        "recipe.validate_every_epochs=1",
+    ]
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose(name, overrides=[*small, *paths, *overrides])
+    with open_dict(cfg):
+        cfg.callbacks = {}
+    return cfg
+
+
+@pytest.fixture(scope="module")
+def trained(place: Path) -> dict[str, dict]:
+    return {name: train(configured(place, f"sim={name}")) for name in ("real", "esim")}
+
+
+@pytest.mark.slow
+def test_a_run_reports_both_test_streams(trained: dict[str, dict]) -> None:
+    esim, real = trained["esim"], trained["real"]
+    assert set(esim["own"]["map_per_class"]) == {"pedestrian", "two_wheeler", "car"}
+    assert esim["own"]["ground_truths_per_class"] == real["real"]["ground_truths_per_class"]
+    assert real["own"] == real["real"]
+    assert esim["recipe"] == real["recipe"]
+    assert esim["system"] != "esim"
+
+
+@pytest.mark.slow
+def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, dict]) -> None:
+    stamps = [run.weights.stat().st_mtime_ns for run in finished_runs(place / "runs/dsec_mini_smoke")]
+    assert train(configured(place, "sim=esim")) == trained["esim"]
+    again = [run.weights.stat().st_mtime_ns for run in finished_runs(place / "runs/dsec_mini_smoke")]
+    assert again == stamps
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_ends_with_the_same_numbers(
+    place: Path, trained: dict[str, dict]
+) -> None:
+    elsewhere = [f"paths.runs={place / 'interrupted'}", "sim=esim", "ckpt_path=last"]
+    cut = configured(place, *elsewhere)
+    with open_dict(cut):
+        cut.callbacks = {"cut": {"_target_": f"{__name__}.PowerCut"}}
+    with pytest.raises(Interrupted):
+        train(cut)
+    assert not list(finished_runs(place / "interrupted/dsec_mini_smoke"))
+    result = train(configured(place, *elsewhere))
+    for stream in ("own", "real"):
+        assert result[stream] == trained["esim"][stream]
+
+
+@pytest.mark.slow
+def test_the_study_is_written_down(place: Path, trained: dict[str, dict]) -> None:
+    evaluate(configured(place, "score=true", "eqs.warmup_windows=1", name="evaluate"))
+    results = place / "results/dsec_mini_smoke"
+    study, scores = pd.read_csv(results / "study.csv"), pd.read_csv(results / "eqs.csv")
+    assert sorted(study["simulator"]) == ["esim", "real"]
+    assert sorted(set(scores["simulator"])) == ["esim", "pix2nvs", "v2e"]
+    assert len(scores) == 3 * 2
+    assert scores["eqs"].between(-1, 1).all()
+    assert scores["eqs"].equals(scores["eqs_hidden_centred"])
+    assert scores["weights_sha256"].nunique() == scores["definition"].nunique() == 1
+    anchors = pd.read_csv(results / "anchors.csv").set_index("anchor")
+    assert (anchors.loc["identical"] - 1).abs().max() < 1e-6
+    assert json.loads((results / "correlation.json").read_text())["results"]
+    report = (results / "report.html").read_text()
+    assert str(place) not in report
+    assert "reference sensor" in report
+    assert "http" not in report.replace("http://www.w3.org", "")
