@@ -18,7 +18,7 @@ from eqs.pipelines.judge import find_judge
 from eqs.pipelines.publish import Findings, publish
 from eqs.pipelines.runs import Run, finished_runs, recipe_hash
 from eqs.pipelines.score import score_recordings
-from eqs.pipelines.timing import PhaseTimes
+from eqs.pipelines.timing import phase_times
 from eqs.study import eqs_table, print_eqs, print_study, study_table, write_table
 
 log = logging.getLogger(__name__)
@@ -91,7 +91,7 @@ def short_names(systems: Sequence[tuple[str, str]]) -> dict[str, str]:
 
 def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console) -> None:
     """Score all systems, write every table and figure and the report."""
-    times = PhaseTimes(Path(cfg.paths.runs) / cfg.data.name / "timings.json")
+    times = phase_times(cfg)
     data = dataset(cfg)
     recordings = data.recordings("test")
     systems = scored_systems(cfg, runs)

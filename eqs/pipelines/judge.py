@@ -11,7 +11,7 @@ from pathlib import Path
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from eqs.data import Recording
+from eqs.data import DSECFolder, Recording
 from eqs.events import EventReader
 from eqs.metrics import (
     Centre,
@@ -115,7 +115,7 @@ def _given_judge(cfg: DictConfig) -> Judge:
     taps = list(dict.fromkeys([cfg.eqs.tap, *cfg.taps]))
     data = instantiate(cfg.data)
     data.prepare()
-    training = data.recordings("train")
+    training = data.recordings("train") if isinstance(data, DSECFolder) else []
     centres: dict[str, Centre] = {}
     if training:
         folder = Path(cfg.paths.results) / cfg.data.name / f"judge-{digest[:12]}"

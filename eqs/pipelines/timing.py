@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from omegaconf import DictConfig
+
 from eqs.files import read_json, write_json
 
 
@@ -36,3 +38,8 @@ class PhaseTimes:
             before = phases.get(phase, 0.0) if resumed else 0.0
             phases[phase] = round(before + time.perf_counter() - start, 1)
             write_json(self.path, {"phases": phases})
+
+
+def phase_times(cfg: DictConfig) -> PhaseTimes:
+    """The times of the configured study, beside its results."""
+    return PhaseTimes(Path(cfg.paths.results) / cfg.data.name / "timings.json")

@@ -19,7 +19,7 @@ from eqs.files import short_hash
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.runs import Run, recipe_hash
-from eqs.pipelines.timing import PhaseTimes
+from eqs.pipelines.timing import PhaseTimes, phase_times
 from eqs.tasks import DetectionTask
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ def train(cfg: DictConfig) -> dict[str, Any]:
     else:
         if cfg.overwrite:
             shutil.rmtree(run.folder, ignore_errors=True)
-        execute(cfg, run, source, PhaseTimes(runs / "timings.json"))
+        execute(cfg, run, source, phase_times(cfg))
     result = run.result()
     show(result)
     return result
