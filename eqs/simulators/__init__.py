@@ -3,6 +3,7 @@
 from eqs.simulators.base import Recorded, Simulator, Stream
 from eqs.simulators.esim import ESIM
 from eqs.simulators.pix2nvs import PIX2NVS
+from eqs.simulators.prophesee import Prophesee
 from eqs.simulators.v2e import V2E
 
-__all__ = ["ESIM", "PIX2NVS", "V2E", "Recorded", "Simulator", "Stream"]
+__all__ = ["ESIM", "PIX2NVS", "V2E", "Prophesee", "Recorded", "Simulator", "Stream"]

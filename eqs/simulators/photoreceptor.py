@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 MICROSECONDS = 1e-6
 
 
-def log_intensity(levels: NDArray[np.float64], offset: float) -> NDArray[np.float64]:
+def log_intensity(levels: NDArray[Any], offset: float) -> NDArray[Any]:
     """Natural log of the intensity, 0..1, above an offset that keeps black finite.
+
+    In the number type of the levels: some programs take the log in float32.
 
     Example:
         >>> log_intensity(np.array([0.0, 255.0]), offset=1e-3).round(3).tolist()

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eqs.simulators import ESIM, PIX2NVS, V2E
+from eqs.simulators import ESIM, PIX2NVS, V2E, Prophesee
 
 FOLDER = Path(__file__).parents[1] / "golden" / "sim"
 PIX2NVS_MODES = {1: "previous", 2: "replace", 3: "integrate"}
@@ -46,6 +46,19 @@ def pix2nvs(given):
     )
 
 
+def prophesee(given):
+    return Prophesee(
+        mode="faithful",
+        threshold_on_log=given["Cp"],
+        threshold_off_log=given["Cn"],
+        threshold_sigma_log=given["sigma_threshold"],
+        cutoff_hz=given["cutoff_hz"],
+        leak_hz=given["leak_rate_hz"],
+        shot_noise_hz=given["shot_noise_rate_hz"],
+        refractory_us=given["refractory_period"],
+    )
+
+
 def matched(times, others, tolerance_us):
     """How many of two sorted lists of times pair up, each used once."""
     pairs, at = 0, 0
@@ -73,6 +86,8 @@ def by_pixel(x, y, p, t):
         ("v2e_1", v2e, 1.0),
         ("pix2nvs_0", pix2nvs, 1.0),
         ("pix2nvs_1", pix2nvs, 1.0),
+        ("prophesee_0", prophesee, 1.0),
+        ("prophesee_1", prophesee, 1.0),
     ],
 )
 def test_faithful_mode_gives_the_published_events(name, build, share):

@@ -9,13 +9,26 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
-from eqs.simulators import ESIM, PIX2NVS, V2E, Recorded
+from eqs.simulators import ESIM, PIX2NVS, V2E, Prophesee, Recorded
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-SIMULATORS = {"esim": ESIM, "v2e": V2E, "pix2nvs": PIX2NVS, "real": Recorded}
+SIMULATORS = {
+    "esim": ESIM,
+    "v2e": V2E,
+    "pix2nvs": PIX2NVS,
+    "prophesee": Prophesee,
+    "real": Recorded,
+}
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
 
-CHANGED = ("esim_noisy", "v2e_paper", "v2e_clean", "v2e_noisy")
+CHANGED = (
+    "esim_noisy",
+    "v2e_paper",
+    "v2e_clean",
+    "v2e_noisy",
+    "prophesee_clean",
+    "prophesee_noisy",
+)
 
 
 def composed(tmp_path, *overrides):
@@ -59,7 +72,7 @@ def test_every_simulator_has_a_parameter_file():
 
 @pytest.mark.parametrize("pair", PRESETS)
 def test_every_preset_composes_and_builds(tmp_path, pair):
-    name, preset = pair.split("_")
+    name, _, preset = pair.rpartition("_")
     config = composed(tmp_path, f"sim={name}", f"preset={preset}")
     simulator = instantiate(config.sim)
     assert simulator.name == name
@@ -72,7 +85,7 @@ def test_every_simulator_has_default_and_paper():
         PRESETS
     )
     words = {path.stem for path in (CONFIGS / "preset").glob("*.yaml")}
-    assert {pair.split("_")[1] for pair in PRESETS} == words
+    assert {pair.rpartition("_")[2] for pair in PRESETS} == words
 
 
 def test_the_paper_preset_states_the_papers_thresholds(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eqs.events import Events
-from eqs.simulators import ESIM, PIX2NVS, V2E, Recorded
+from eqs.simulators import ESIM, PIX2NVS, V2E, Prophesee, Recorded
 
 SIMULATORS = [
     ESIM(),
@@ -22,6 +22,9 @@ SIMULATORS = [
     PIX2NVS(),
     PIX2NVS(reference_update="integrate", block=4),
     PIX2NVS(mode="faithful", reference_update="replace", block=2),
+    Prophesee(),
+    Prophesee(cutoff_hz=5, leak_hz=3, shot_noise_hz=20, refractory_us=9000, seed=5),
+    Prophesee(mode="faithful", cutoff_hz=5, leak_hz=3, shot_noise_hz=20, refractory_us=9000),
 ]
 SILENT = [
     ESIM(),
@@ -30,7 +33,10 @@ SILENT = [
     V2E(mode="faithful", leak_hz=0, shot_noise_hz=0),
     PIX2NVS(),
     PIX2NVS(mode="faithful", adaptation=0),
+    Prophesee(shot_noise_hz=0),
+    Prophesee(mode="faithful", shot_noise_hz=0),
 ]
+MISMATCH_ALONE = {("esim", "fixed")}
 FIELDS = ("t", "x", "y", "p")
 
 
@@ -121,8 +127,8 @@ def test_a_still_scene_is_silent_without_noise(simulator):
 def test_sequence_and_seed_matter_only_to_noise(simulator, walk):
     first = simulator.simulate(*walk, sequence="a")
     second = simulator.simulate(*walk, sequence="b")
-    # The mismatch of ESIM's fixed mode belongs to the sensor; all other noise goes on in time.
-    noisy = simulator.stochastic and (simulator.name, simulator.mode) != ("esim", "fixed")
+    # What has mismatch alone in its fixed mode differs by sensor; all other noise goes on in time.
+    noisy = simulator.stochastic and (simulator.name, simulator.mode) not in MISMATCH_ALONE
     same = len(first) == len(second) and np.array_equal(first.t, second.t)
     assert same != noisy
     assert ("seed" in simulator.parameters()) == simulator.stochastic
@@ -208,6 +214,9 @@ def test_a_stream_without_frames_cannot_finish():
         (V2E, {"cutoff_hz": -1}),
         (V2E, {"leak_hz": -1}),
         (V2E, {"shot_noise_hz": float("nan")}),
+        (Prophesee, {"threshold_off_log": 0}),
+        (Prophesee, {"log_offset": 0}),
+        (Prophesee, {"leak_hz": -1}),
         (PIX2NVS, {"threshold_log": 0}),
         (PIX2NVS, {"threshold_log": 0.1}),
         (PIX2NVS, {"adaptation": 1}),

@@ -1,0 +1,28 @@
+"""What the tests of single simulators share."""
+
+import math
+
+import numpy as np
+
+
+def still(level, frames, size):
+    """Frames of a scene in which nothing happens."""
+    return np.full((frames, size, size), level, np.uint8)
+
+
+def rows(events):
+    """Events as a sorted list of (t, y, x, p)."""
+    fields = (events.t, events.y, events.x, events.p)
+    return sorted(zip(*(field.tolist() for field in fields), strict=True))
+
+
+def assert_agree(events, expected, least):
+    """The same events up to a rounding error that crosses a microsecond, and not too few."""
+    found = rows(events)
+    assert len(found) == len(expected) > least
+    assert np.mean([one == other for one, other in zip(found, expected, strict=True)]) > 0.99
+
+
+def assert_poisson(count, expected):
+    """A count within four standard deviations of a Poisson distribution's mean."""
+    assert abs(count - expected) < 4 * math.sqrt(expected)
