@@ -1,9 +1,21 @@
 """Event-camera simulators: frames in, events out, one module per published model."""
 
 from eqs.simulators.base import Recorded, Simulator, Stream
+from eqs.simulators.carla import CARLA
 from eqs.simulators.esim import ESIM
+from eqs.simulators.gazebo import Gazebo
 from eqs.simulators.pix2nvs import PIX2NVS
 from eqs.simulators.prophesee import Prophesee
 from eqs.simulators.v2e import V2E
 
-__all__ = ["ESIM", "PIX2NVS", "V2E", "Prophesee", "Recorded", "Simulator", "Stream"]
+__all__ = [
+    "CARLA",
+    "ESIM",
+    "PIX2NVS",
+    "V2E",
+    "Gazebo",
+    "Prophesee",
+    "Recorded",
+    "Simulator",
+    "Stream",
+]

@@ -57,6 +57,8 @@ class ESIM(Simulator):
     """
 
     name: ClassVar[str] = "esim"
+    shares_first_buffer: ClassVar[bool] = True
+    """Whether the program keeps start and reference in one buffer during the first interval."""
 
     threshold_on_log: float = 0.2
     threshold_off_log: float = 0.2
@@ -150,7 +152,7 @@ class FaithfulESIMPixels(ESIMPixels):
             (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
             draw_key(model.seed, "threshold jitter", self.sequence, str(interval.frame)),
             float(model.refractory_us),
-            interval.frame == 1,
+            model.shares_first_buffer and interval.frame == 1,
             interval.start_us,
             interval.span_us,
             self.keys,
@@ -236,7 +238,6 @@ def _fire_official(
             offset_us = crossing_share(level, first, last) * span_us
             reference[pixel] = level
             if shared_buffer:
-                # The program keeps start and reference in one buffer during the first interval.
                 first = level
             level = np.float32(level + step)
             if refractory_us > 0:

@@ -9,7 +9,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
-from eqs.simulators import ESIM, PIX2NVS, V2E, Prophesee, Recorded
+from eqs.simulators import CARLA, ESIM, PIX2NVS, V2E, Gazebo, Prophesee, Recorded
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SIMULATORS = {
@@ -17,6 +17,8 @@ SIMULATORS = {
     "v2e": V2E,
     "pix2nvs": PIX2NVS,
     "prophesee": Prophesee,
+    "carla": CARLA,
+    "gazebo": Gazebo,
     "real": Recorded,
 }
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))

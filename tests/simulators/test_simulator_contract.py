@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eqs.events import Events
-from eqs.simulators import ESIM, PIX2NVS, V2E, Prophesee, Recorded
+from eqs.simulators import CARLA, ESIM, PIX2NVS, V2E, Gazebo, Prophesee, Recorded
 
 SIMULATORS = [
     ESIM(),
@@ -25,6 +25,10 @@ SIMULATORS = [
     Prophesee(),
     Prophesee(cutoff_hz=5, leak_hz=3, shot_noise_hz=20, refractory_us=9000, seed=5),
     Prophesee(mode="faithful", cutoff_hz=5, leak_hz=3, shot_noise_hz=20, refractory_us=9000),
+    CARLA(threshold_sigma_log=0.05),
+    CARLA(mode="faithful", logarithmic=False, threshold_on_log=9.0, threshold_off_log=7.0),
+    Gazebo(),
+    Gazebo(mode="faithful"),
 ]
 SILENT = [
     ESIM(),
@@ -35,8 +39,11 @@ SILENT = [
     PIX2NVS(mode="faithful", adaptation=0),
     Prophesee(shot_noise_hz=0),
     Prophesee(mode="faithful", shot_noise_hz=0),
+    CARLA(),
+    CARLA(mode="faithful"),
+    Gazebo(),
 ]
-MISMATCH_ALONE = {("esim", "fixed")}
+MISMATCH_ALONE = {("esim", "fixed"), ("carla", "fixed")}
 FIELDS = ("t", "x", "y", "p")
 
 
@@ -214,6 +221,8 @@ def test_a_stream_without_frames_cannot_finish():
         (V2E, {"cutoff_hz": -1}),
         (V2E, {"leak_hz": -1}),
         (V2E, {"shot_noise_hz": float("nan")}),
+        (CARLA, {"threshold_on_log": 0}),
+        (Gazebo, {"threshold_level": 0}),
         (Prophesee, {"threshold_off_log": 0}),
         (Prophesee, {"log_offset": 0}),
         (Prophesee, {"leak_hz": -1}),
