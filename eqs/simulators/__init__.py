@@ -2,6 +2,7 @@
 
 from eqs.simulators.base import Recorded, Simulator, Stream
 from eqs.simulators.carla import CARLA
+from eqs.simulators.dvs_voltmeter import DVSVoltmeter
 from eqs.simulators.esim import ESIM
 from eqs.simulators.gazebo import Gazebo
 from eqs.simulators.pix2nvs import PIX2NVS
@@ -13,6 +14,7 @@ __all__ = [
     "ESIM",
     "PIX2NVS",
     "V2E",
+    "DVSVoltmeter",
     "Gazebo",
     "Prophesee",
     "Recorded",

@@ -9,7 +9,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
-from eqs.simulators import CARLA, ESIM, PIX2NVS, V2E, Gazebo, Prophesee, Recorded
+from eqs.simulators import CARLA, ESIM, PIX2NVS, V2E, DVSVoltmeter, Gazebo, Prophesee, Recorded
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SIMULATORS = {
@@ -19,6 +19,7 @@ SIMULATORS = {
     "prophesee": Prophesee,
     "carla": CARLA,
     "gazebo": Gazebo,
+    "dvs_voltmeter": DVSVoltmeter,
     "real": Recorded,
 }
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
@@ -30,6 +31,8 @@ CHANGED = (
     "v2e_noisy",
     "prophesee_clean",
     "prophesee_noisy",
+    "dvs_voltmeter_clean",
+    "dvs_voltmeter_davis240",
 )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from eqs.events import Events
-from eqs.simulators import CARLA, ESIM, PIX2NVS, V2E, Gazebo, Prophesee, Recorded
+from eqs.simulators import CARLA, ESIM, PIX2NVS, V2E, DVSVoltmeter, Gazebo, Prophesee, Recorded
 
 SIMULATORS = [
     ESIM(),
@@ -29,6 +29,8 @@ SIMULATORS = [
     CARLA(mode="faithful", logarithmic=False, threshold_on_log=9.0, threshold_off_log=7.0),
     Gazebo(),
     Gazebo(mode="faithful"),
+    DVSVoltmeter(),
+    DVSVoltmeter(mode="faithful", photon_noise_per_sqrt_us=0.05, light_leak_per_us=1e-7, seed=5),
 ]
 SILENT = [
     ESIM(),
@@ -42,6 +44,12 @@ SILENT = [
     CARLA(),
     CARLA(mode="faithful"),
     Gazebo(),
+    DVSVoltmeter(
+        leak_per_us=0,
+        light_leak_per_us=0,
+        photon_noise_per_sqrt_us=0,
+        thermal_noise_per_sqrt_us=0,
+    ),
 ]
 MISMATCH_ALONE = {("esim", "fixed"), ("carla", "fixed")}
 FIELDS = ("t", "x", "y", "p")
@@ -221,6 +229,9 @@ def test_a_stream_without_frames_cannot_finish():
         (V2E, {"cutoff_hz": -1}),
         (V2E, {"leak_hz": -1}),
         (V2E, {"shot_noise_hz": float("nan")}),
+        (DVSVoltmeter, {"contrast_gain": 0}),
+        (DVSVoltmeter, {"dark_level": 0}),
+        (DVSVoltmeter, {"leak_per_us": -1e-7}),
         (CARLA, {"threshold_on_log": 0}),
         (Gazebo, {"threshold_level": 0}),
         (Prophesee, {"threshold_off_log": 0}),
