@@ -5,6 +5,7 @@ from eqs.simulators.carla import CARLA
 from eqs.simulators.dvs_voltmeter import DVSVoltmeter
 from eqs.simulators.esim import ESIM
 from eqs.simulators.gazebo import Gazebo
+from eqs.simulators.icns import ICNS
 from eqs.simulators.pix2nvs import PIX2NVS
 from eqs.simulators.prophesee import Prophesee
 from eqs.simulators.v2e import V2E
@@ -12,6 +13,7 @@ from eqs.simulators.v2e import V2E
 __all__ = [
     "CARLA",
     "ESIM",
+    "ICNS",
     "PIX2NVS",
     "V2E",
     "DVSVoltmeter",

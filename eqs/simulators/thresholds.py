@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from eqs.simulators.randomness import draw_key, normal_map
+from eqs.simulators.randomness import draw_key, normal, normal_map
 
 SMALLEST_THRESHOLD_LOG = 0.01
 
@@ -26,3 +27,17 @@ def threshold_map(
         return np.broadcast_to(np.float64(mean_log), (pixels,))
     drawn = mean_log + sigma_log * normal_map(draw_key(seed, name), pixels)
     return np.maximum(drawn, SMALLEST_THRESHOLD_LOG)
+
+
+@njit(cache=True)
+def redraw(
+    thresholds: NDArray[np.float64],
+    pixel: int,
+    mean_log: float,
+    sigma_log: float,
+    smallest_log: float,
+    word: np.uint64,
+) -> None:
+    """Draw a pixel's threshold anew, as after an event; nothing happens without spread."""
+    if sigma_log > 0.0:
+        thresholds[pixel] = max(mean_log + sigma_log * normal(word), smallest_log)

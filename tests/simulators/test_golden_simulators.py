@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eqs.simulators import ESIM, PIX2NVS, V2E, Prophesee
+from eqs.simulators import ESIM, ICNS, PIX2NVS, V2E, Prophesee
 
 FOLDER = Path(__file__).parents[1] / "golden" / "sim"
 PIX2NVS_MODES = {1: "previous", 2: "replace", 3: "integrate"}
@@ -59,6 +59,21 @@ def prophesee(given):
     )
 
 
+def icns(given):
+    return ICNS(
+        mode="faithful",
+        threshold_on_log=given["th_pos"],
+        threshold_off_log=given["th_neg"],
+        threshold_sigma_log=given["th_noise"],
+        latency_us=given["lat"],
+        jitter_us=given["jit"],
+        refractory_us=given["ref"],
+        time_constant_us=given["tau"],
+        background_on_hz=given["bgnp"],
+        background_off_hz=given["bgnn"],
+    )
+
+
 def matched(times, others, tolerance_us):
     """How many of two sorted lists of times pair up, each used once."""
     pairs, at = 0, 0
@@ -88,6 +103,7 @@ def by_pixel(x, y, p, t):
         ("pix2nvs_1", pix2nvs, 1.0),
         ("prophesee_0", prophesee, 1.0),
         ("prophesee_1", prophesee, 1.0),
+        ("icns_0", icns, 1.0),
     ],
 )
 def test_faithful_mode_gives_the_published_events(name, build, share):

@@ -9,7 +9,17 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
-from eqs.simulators import CARLA, ESIM, PIX2NVS, V2E, DVSVoltmeter, Gazebo, Prophesee, Recorded
+from eqs.simulators import (
+    CARLA,
+    ESIM,
+    ICNS,
+    PIX2NVS,
+    V2E,
+    DVSVoltmeter,
+    Gazebo,
+    Prophesee,
+    Recorded,
+)
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SIMULATORS = {
@@ -20,6 +30,7 @@ SIMULATORS = {
     "carla": CARLA,
     "gazebo": Gazebo,
     "dvs_voltmeter": DVSVoltmeter,
+    "icns": ICNS,
     "real": Recorded,
 }
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
@@ -33,6 +44,7 @@ CHANGED = (
     "prophesee_noisy",
     "dvs_voltmeter_clean",
     "dvs_voltmeter_davis240",
+    "icns_clean",
 )
 
 
