@@ -2,7 +2,9 @@
 PYTHON ?= python3
 # Extra arguments for pip, for instance the index that serves the CUDA build of torch you want.
 PIP_ARGS ?=
-SIMULATORS ?= esim,v2e,pix2nvs
+SIMULATORS ?= esim v2e pix2nvs
+# Trainings side by side: two that share the cores finish sooner than one after the other.
+JOBS ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
@@ -15,14 +17,19 @@ help: ## List the targets
 install: $(INSTALLED) ## Create .venv and install the package with the tested versions
 
 $(INSTALLED): pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.12")'
-	$(PYTHON) -m venv $(VENV)
-	$(VENV)/bin/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[dev]'
-	@touch $@
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.12")'
+	@echo "installing into $(VENV), which takes a few minutes"
+	@start=$$(date +%s) \
+	&& $(PYTHON) -m venv $(VENV) \
+	&& $(VENV)/bin/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[dev]' \
+	&& echo $$(($$(date +%s) - start)) > $@
 
 study: install ## Run the whole study on dsec_mini: generate, simulate, train, score, report
-	@$(VENV)/bin/python train.py -m sim=real,$(SIMULATORS) ckpt_path=last
+	@$(VENV)/bin/python scripts/prepare.py
+	@printf '%s\n' real $(SIMULATORS) | xargs -P $(JOBS) -I{} $(VENV)/bin/python train.py sim={} \
+		jobs=$(JOBS) callbacks=lines ckpt_path=last
 	@$(VENV)/bin/python evaluate.py --eqs
+	@printf '  %-24s%8.1f s\n' install "$$(cat $(INSTALLED))"
 
 test: install ## Run the tests
 	$(VENV)/bin/python -m pytest

@@ -80,7 +80,8 @@ class SimulatedEvents:
     @property
     def label(self) -> str:
         """Name and parameter hash, unique for what would be simulated."""
-        return f"{self.simulator.name}-{short_hash(self.simulator.parameters())}"
+        identity = [self.simulator.parameters(), self.simulator.version]
+        return f"{self.simulator.name}-{short_hash(identity)}"
 
     def path(self, recording: Recording) -> Path:
         """Where the recording's simulated events lie, in DSEC layout."""

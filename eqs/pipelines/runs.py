@@ -9,6 +9,7 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
+from eqs import __version__
 from eqs.files import read_json, short_hash, write_json
 
 # What makes two detectors comparable: everything a training depends on but stream and seed ...
@@ -29,7 +30,7 @@ def recipe_hash(cfg: DictConfig) -> str:
         }
         for key in RECIPE_KEYS
     }
-    return short_hash(recipe)
+    return short_hash({**recipe, "version": __version__})
 
 
 @dataclass(frozen=True)

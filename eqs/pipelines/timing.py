@@ -1,4 +1,4 @@
-"""How long each phase of a study took, kept across interruptions."""
+"""How long each phase of a study took, kept across interruptions and parallel commands."""
 
 from __future__ import annotations
 
@@ -15,31 +15,33 @@ from eqs.files import read_json, write_json
 
 @dataclass(frozen=True)
 class PhaseTimes:
-    """Seconds per phase in a JSON file.
+    """Seconds per phase, a small file each, so that commands side by side do not collide.
 
     Args:
-        path: the file; it need not exist yet.
+        folder: where the files lie; it need not exist yet.
     """
 
-    path: Path
+    folder: Path
 
     def read(self) -> dict[str, float]:
-        """Seconds by phase, in the order in which the phases first ran."""
-        return read_json(self.path)["phases"] if self.path.exists() else {}
+        """Seconds by phase, in the order in which the phases were begun."""
+        records = [read_json(path) for path in self.folder.glob("*.json")]
+        records.sort(key=lambda record: record["begun"])
+        return {record["phase"]: record["seconds"] for record in records}
 
     @contextmanager
     def measure(self, phase: str, *, resumed: bool = False) -> Iterator[None]:
         """Time a block of work; a resumed phase adds to the time it had taken before."""
-        start = time.perf_counter()
+        path = self.folder / f"{phase.replace(' ', '-')}.json"
+        before = read_json(path) if resumed and path.exists() else {}
+        begun, start = before.get("begun", time.time()), time.perf_counter()
         try:
             yield
         finally:
-            phases = self.read()
-            before = phases.get(phase, 0.0) if resumed else 0.0
-            phases[phase] = round(before + time.perf_counter() - start, 1)
-            write_json(self.path, {"phases": phases})
+            seconds = before.get("seconds", 0.0) + time.perf_counter() - start
+            write_json(path, {"phase": phase, "seconds": round(seconds, 1), "begun": begun})
 
 
 def phase_times(cfg: DictConfig) -> PhaseTimes:
     """The times of the configured study, beside its results."""
-    return PhaseTimes(Path(cfg.paths.results) / cfg.data.name / "timings.json")
+    return PhaseTimes(Path(cfg.paths.results) / cfg.data.name / "timings")

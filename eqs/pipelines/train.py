@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import os
 import shutil
 import time
 from pathlib import Path
 from typing import Any
 
 import lightning
+import torch
 from hydra.utils import instantiate
 from lightning.pytorch.callbacks import Callback, ModelCheckpoint
 from omegaconf import DictConfig
@@ -16,14 +18,14 @@ from rich.console import Console
 
 from eqs.data import EventSource, LabelProtocol, RecordedEvents
 from eqs.files import short_hash
-from eqs.pipelines.build import dataset, event_source
+from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
+from eqs.pipelines.prepare import prepare_data, prepare_stream
 from eqs.pipelines.runs import Run, recipe_hash
 from eqs.pipelines.timing import PhaseTimes, phase_times
 from eqs.tasks import DetectionTask
 
 log = logging.getLogger(__name__)
-SPLITS = ("train", "val", "test")
 
 
 @explained
@@ -46,10 +48,9 @@ def train(cfg: DictConfig) -> dict[str, Any]:
 def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -> None:
     """Do the work of one run and record what it measured."""
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
-    with times.measure("generate data"):
-        data = dataset(cfg)
-    with times.measure(f"simulate {source.label}"):
-        source.prepare([r for split in SPLITS for r in data.recordings(split)])
+    torch.set_num_threads(max(1, (os.cpu_count() or 1) // cfg.jobs))
+    data = prepare_data(cfg, times)
+    prepare_stream(source, data, times)
     run.save_config(cfg)
     tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
     if isinstance(source, RecordedEvents):
@@ -61,7 +62,7 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
     task = build_task(cfg, protocol, list(tests))
     trainer = build_trainer(cfg, run)
     checkpoint = checkpoint_path(cfg, run)
-    with times.measure(f"train {source.label}", resumed=checkpoint is not None):
+    with times.measure(f"train {source.name}", resumed=checkpoint is not None):
         start = time.perf_counter()
         trainer.fit(task, datamodule, ckpt_path=checkpoint)
         trainer.save_checkpoint(run.weights, weights_only=True)

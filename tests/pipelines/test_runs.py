@@ -73,8 +73,9 @@ def test_settings_of_one_simulator_keep_their_labels() -> None:
 
 
 def test_a_resumed_phase_adds_to_its_time(tmp_path: Path) -> None:
-    times = PhaseTimes(tmp_path / "timings.json")
-    (tmp_path / "timings.json").write_text('{"phases": {"train": 100.0}}')
+    times = PhaseTimes(tmp_path / "timings")
+    (tmp_path / "timings").mkdir()
+    (tmp_path / "timings/train.json").write_text('{"phase": "train", "seconds": 100.0, "begun": 1}')
     with times.measure("train", resumed=True):
         pass
     with times.measure("report"):

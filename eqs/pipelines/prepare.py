@@ -1,0 +1,34 @@
+"""Make what every training needs: the data set and the simulated streams."""
+
+from __future__ import annotations
+
+from omegaconf import DictConfig
+
+from eqs.data import EventSource
+from eqs.pipelines.build import Dataset, dataset, event_source
+from eqs.pipelines.command import explained
+from eqs.pipelines.timing import PhaseTimes, phase_times
+
+SPLITS = ("train", "val", "test")
+
+
+@explained
+def prepare(cfg: DictConfig) -> None:
+    """Generate or check the data set, then run every configured simulator over it."""
+    times = phase_times(cfg)
+    data = prepare_data(cfg, times)
+    for simulator in cfg.simulators.values():
+        prepare_stream(event_source(simulator, cfg), data, times)
+
+
+def prepare_data(cfg: DictConfig, times: PhaseTimes) -> Dataset:
+    """The data set, generated where it can be and is not there."""
+    with times.measure("generate data", resumed=True):
+        return dataset(cfg)
+
+
+def prepare_stream(source: EventSource, data: Dataset, times: PhaseTimes) -> None:
+    """The source's events of every recording."""
+    recordings = [recording for split in SPLITS for recording in data.recordings(split)]
+    with times.measure(f"simulate {source.name}", resumed=True):
+        source.prepare(recordings)
