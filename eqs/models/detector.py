@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from eqs.models.attention import LAYER_SCALE_INIT, LayerScale
 from eqs.models.backbone import RVTBackbone
 from eqs.models.checkpoint import load_weights, read_weights, shape_of
 from eqs.models.fpn import PAFPN
@@ -45,6 +46,8 @@ class RVTDetector(nn.Module):
         weights: checkpoint to load strictly, None to start from random weights.
         new_class_branch: where `weights` knows another number of classes, start the layers that
             depend on it anew instead of failing.
+        layer_scale_init: factor that every attention and MLP branch starts with; the published one
+            is close to nothing, a larger one lets a short training use the branches at once.
 
     Raises:
         ValueError: an unknown size, or weights that do not fit.
@@ -66,6 +69,7 @@ class RVTDetector(nn.Module):
         partition_split_32: int = 2,
         weights: str | Path | None = None,
         new_class_branch: bool = False,
+        layer_scale_init: float = LAYER_SCALE_INIT,
     ) -> None:
         """Build the network, then load `weights` if there are any."""
         super().__init__()
@@ -85,6 +89,9 @@ class RVTDetector(nn.Module):
         widths = self.backbone.widths[1:]
         self.fpn = PAFPN(widths, shape.pyramid_depth)
         self.yolox_head = YOLOXHead(widths, num_classes)
+        for module in self.modules():
+            if isinstance(module, LayerScale):
+                nn.init.constant_(module.gamma, layer_scale_init)
         if weights is not None:
             load_weights(self, weights, new_class_branch=new_class_branch)
 

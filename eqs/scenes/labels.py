@@ -37,10 +37,10 @@ class LabelRule:
         least_inside: least share of the box that lies inside the image.
     """
 
-    smallest_width: float = 0.025
-    smallest_height: float = 0.07
-    least_visible: float = 0.35
-    least_inside: float = 0.3
+    smallest_width: float = 20 / 640
+    smallest_height: float = 20 / 480
+    least_visible: float = 0.5
+    least_inside: float = 0.1
 
     def boxes(self, view: View, t_us: int) -> NDArray[np.void]:
         """Rows of `TRACK_DTYPE` for one instant, boxes clipped to the image."""

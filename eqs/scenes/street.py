@@ -91,7 +91,7 @@ def _waves(rng: np.random.Generator, scale: float) -> NDArray[np.float64]:
 
 def draw_drive(rng: np.random.Generator, *, still: bool) -> Drive:
     """A drive along the right lane; a `still` one waits with the engine running."""
-    speed = 0.0 if still else rng.uniform(5.0, 14.0)
+    speed = 0.0 if still else rng.uniform(4.0, 11.0)
     return Drive(
         speed=speed,
         x=LANE_M + rng.uniform(-0.3, 0.3),
@@ -233,7 +233,7 @@ def draw_vehicles(
     """Parked, leading and oncoming cars and trucks."""
     found = []
     for side, heading in ((1.0, 0.0), (-1.0, np.pi)):
-        share, z = rng.uniform(0.1, 0.5), rng.uniform(2.0, 10.0)
+        share, z = rng.uniform(0.05, 0.35), rng.uniform(2.0, 10.0)
         while z < way_m + 55.0:
             if rng.random() < share:
                 heavy = rng.random() < 0.08
@@ -269,13 +269,15 @@ def draw_people(
         walking = rng.random() < 0.8
         speed = rng.uniform(1.0, 1.8) if walking else 0.0
         heading = float(rng.choice([0.0, np.pi])) + rng.uniform(-0.1, 0.1)
-        x = rng.choice([-1.0, 1.0]) * rng.uniform(KERB_M + 0.3, HALF_STREET_M - 0.8)
-        z = rng.uniform(8.0, way_m + 28.0)
+        beside = rng.random() < 0.4  # on the road beside the parked cars
+        x = rng.uniform(3.6, 4.2) if beside else rng.uniform(KERB_M + 0.3, HALF_STREET_M - 0.8)
+        x *= rng.choice([-1.0, 1.0])
+        z = rng.uniform(6.0, way_m + 22.0)
         parts = _pedestrian(rng, gait=speed * 4.6)
         found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=PEDESTRIAN, parts=parts))
     for _ in range(rng.integers(1, 4)):
         side, speed = rng.choice([-1.0, 1.0]), rng.uniform(1.0, 1.9)
-        x, z = side * rng.uniform(1.0, KERB_M), way_m + rng.uniform(8.0, 24.0)
+        x, z = side * rng.uniform(1.0, KERB_M), way_m + rng.uniform(5.0, 18.0)
         parts = _pedestrian(rng, gait=speed * 4.6)
         found.append(
             Actor(x=x, z=z, speed=speed, heading=-side * np.pi / 2, label=PEDESTRIAN, parts=parts)
@@ -284,11 +286,11 @@ def draw_people(
         speed, kind = rng.uniform(3.0, 6.5), rng.random()
         parts = _cyclist(rng, lit=night)
         if kind < 0.45:
-            x, z, heading = rng.uniform(3.1, 3.9), rng.uniform(9.0, 0.7 * way_m + 22.0), 0.0
+            x, z, heading = rng.uniform(3.1, 3.9), rng.uniform(7.0, 0.7 * way_m + 16.0), 0.0
         elif kind < 0.65:
-            x, z, heading = -rng.uniform(3.3, 3.9), rng.uniform(15.0, way_m + 35.0), np.pi
+            x, z, heading = -rng.uniform(2.4, 3.4), rng.uniform(12.0, way_m + 28.0), np.pi
         else:
             heading = float(rng.choice([-1.0, 1.0])) * np.pi / 2
-            x, z = -np.sign(heading) * rng.uniform(3.0, 9.0), way_m + rng.uniform(10.0, 25.0)
+            x, z = -np.sign(heading) * rng.uniform(3.0, 9.0), way_m + rng.uniform(7.0, 20.0)
         found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=RIDER, parts=parts))
     return found

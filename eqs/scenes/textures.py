@@ -127,7 +127,7 @@ def front(
         edge = max(1, round(0.25 / texel_m))
         albedo[:, columns.start : columns.start + edge] *= 0.45
         start = stop
-    albedo *= mottle(rng, albedo.shape, texel_m, 0.22)
+    albedo *= mottle(rng, albedo.shape, texel_m, 0.1)
     height = (np.arange(rows)[:, None] + 0.5) * texel_m
     light = np.full(albedo.shape, lighting.ambient_lux)
     light += lighting.sun_lux * 0.7 * (side == lighting.sun_side)
@@ -157,10 +157,10 @@ def ground(
     z = ((np.arange(length) + 0.5) * texel_m)[None]
     asphalt, paving = rng.uniform(0.07, 0.13), rng.uniform(0.2, 0.32)
     albedo = np.where(np.abs(x) < KERB_M, asphalt, paving) * np.ones_like(z)
-    albedo *= mottle(rng, albedo.shape, texel_m, 0.28)
+    albedo *= mottle(rng, albedo.shape, texel_m, 0.07)
     white, dark = _markings(rng, x, z)
-    albedo[dark] *= 0.45
-    for _ in range(40):  # patches, manholes and tar seams
+    albedo[dark] *= 0.7
+    for _ in range(15):  # patches, manholes and tar seams
         at_x, at_z = rng.uniform(-KERB_M, KERB_M), rng.uniform(1.0, PERIOD_M - 1.0)
         long_x, long_z = np.exp(rng.uniform(np.log(0.15), np.log(1.2), size=2))
         inside = (np.abs(x - at_x) < long_x) & (np.abs(z - at_z) < 2.0 * long_z)

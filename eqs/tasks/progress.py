@@ -6,12 +6,12 @@ import logging
 import time
 
 import lightning
-from lightning.pytorch.callbacks import Callback
+from lightning.pytorch.callbacks import ProgressBar
 
 log = logging.getLogger(__name__)
 
 
-class EpochLines(Callback):
+class EpochLines(ProgressBar):
     """Log loss, validation mAP and the time left at every epoch's end.
 
     Args:
@@ -20,6 +20,7 @@ class EpochLines(Callback):
 
     def __init__(self, label: str) -> None:
         """Keep the label; the clock starts with the training."""
+        super().__init__()
         self.label = label
         self._start = 0.0
         self._first_epoch = 0
