@@ -6,6 +6,7 @@ from eqs.simulators.dvs_voltmeter import DVSVoltmeter
 from eqs.simulators.esim import ESIM
 from eqs.simulators.gazebo import Gazebo
 from eqs.simulators.icns import ICNS
+from eqs.simulators.improved_esim import ImprovedESIM
 from eqs.simulators.pix2nvs import PIX2NVS
 from eqs.simulators.prophesee import Prophesee
 from eqs.simulators.v2e import V2E
@@ -18,6 +19,7 @@ __all__ = [
     "V2E",
     "DVSVoltmeter",
     "Gazebo",
+    "ImprovedESIM",
     "Prophesee",
     "Recorded",
     "Simulator",

@@ -17,6 +17,7 @@ from eqs.simulators import (
     V2E,
     DVSVoltmeter,
     Gazebo,
+    ImprovedESIM,
     Prophesee,
     Recorded,
 )
@@ -31,6 +32,7 @@ SIMULATORS = {
     "gazebo": Gazebo,
     "dvs_voltmeter": DVSVoltmeter,
     "icns": ICNS,
+    "improved_esim": ImprovedESIM,
     "real": Recorded,
 }
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
@@ -45,6 +47,7 @@ CHANGED = (
     "dvs_voltmeter_clean",
     "dvs_voltmeter_davis240",
     "icns_clean",
+    "improved_esim_clean",
 )
 
 

@@ -18,6 +18,7 @@ from eqs.simulators import (
     V2E,
     DVSVoltmeter,
     Gazebo,
+    ImprovedESIM,
     Prophesee,
     Recorded,
 )
@@ -43,6 +44,9 @@ SIMULATORS = [
     DVSVoltmeter(mode="faithful", photon_noise_per_sqrt_us=0.05, light_leak_per_us=1e-7, seed=5),
     ICNS(time_constant_us=3000.0, background_on_hz=3, background_off_hz=2, jitter_us=500, seed=5),
     ICNS(mode="faithful", time_constant_us=3000.0, background_on_hz=3, threshold_sigma_log=0.1),
+    ImprovedESIM(),
+    ImprovedESIM(white_current_fa=20.0, leak_hz=3, threshold_sigma_log=0.03, refractory_us=900),
+    ImprovedESIM(mode="faithful", threshold_on_log=0.1, refractory_us=9000, order=2),
 ]
 SILENT = [
     ESIM(),
@@ -64,6 +68,8 @@ SILENT = [
     ),
     ICNS(background_on_hz=0, background_off_hz=0),
     ICNS(background_on_hz=0, background_off_hz=0, mode="faithful"),
+    ImprovedESIM(order=3),
+    ImprovedESIM(mode="faithful", leak_hz=2),
 ]
 MISMATCH_ALONE = {("esim", "fixed"), ("carla", "fixed")}
 FIELDS = ("t", "x", "y", "p")
@@ -251,6 +257,9 @@ def test_a_stream_without_frames_cannot_finish():
         (ICNS, {"time_constant_us": 0}),
         (ICNS, {"white_lux": 0}),
         (ICNS, {"background_on_hz": -1}),
+        (ImprovedESIM, {"order": 1}),
+        (ImprovedESIM, {"dark_current_fa": 0}),
+        (ImprovedESIM, {"leak_hz": -1}),
         (CARLA, {"threshold_on_log": 0}),
         (Gazebo, {"threshold_level": 0}),
         (Prophesee, {"threshold_off_log": 0}),
