@@ -96,7 +96,10 @@ def test_unknown_sizes_and_counts_are_named():
 @pytest.mark.parametrize("size", ["tiny", "small", "base"])
 def test_configurations_build_their_size(size):
     config = OmegaConf.load(CONFIGS / f"rvt_{size}.yaml")
-    # These two come from other groups of the whole configuration.
-    config.num_classes, config.partition_split_32 = 3, 2
+    # These come from other groups of the whole configuration.
+    config.num_classes, config.partition_split_32, config.layer_scale_init = 3, 2, 0.1
     model = instantiate(config)
     assert (model.size, model.num_classes, model.backbone.multiple) == (size, 3, 64)
+    gammas = [value for name, value in model.named_parameters() if name.endswith("gamma")]
+    assert len(gammas) == 16
+    assert all((gamma == 0.1).all() for gamma in gammas)
