@@ -40,7 +40,7 @@ def configured(place: Path, *overrides: str, name: str = "train") -> DictConfig:
         "data.size=64x48",
         "data.generator.frames=8",
         "data.generator.sequences={train: 2, val: 1, test: 2}",
-        "data.generator.workers=1",
+        "+data.generator.workers=1",
         "recipe.steps_per_epoch=2",
         "recipe.validate_every_epochs=1",
     ]

@@ -1,0 +1,90 @@
+"""Whatever a newcomer mistypes ends in one sentence that names a key."""
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hydra import compose, initialize_config_dir
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+
+import eqs
+from eqs.pipelines import register_resolvers
+from eqs.pipelines.command import explained
+
+CONFIGS = Path(eqs.__file__).parent.parent / "configs"
+
+
+def composed(*overrides: str) -> DictConfig:
+    register_resolvers()
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        return compose("train", overrides=list(overrides))
+
+
+@pytest.fixture
+def said(caplog: pytest.LogCaptureFixture) -> Callable[..., str]:
+    """The sentence in which a command ends."""
+
+    def run(work: Callable[[DictConfig], object], *overrides: str) -> str:
+        with caplog.at_level(logging.ERROR), pytest.raises(SystemExit) as stopped:
+            explained(work)(composed(*overrides))
+        assert stopped.value.code == 1
+        (record,) = caplog.records
+        assert "\n" not in record.message
+        return record.message
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("override", "wanted"),
+    [
+        ("sim.threshold_on_log=high", "threshold_on_log above 0, got 'high'; set sim.threshold_on"),
+        ("sim.threshold_off_log=null", "threshold_off_log above 0, got None; set sim.threshold_of"),
+        ("sim.refractory_us=-1", "refractory_us of 0 or more, got -1; set sim.refractory_us"),
+        ("+sim.foo=1", "unexpected keyword argument 'foo'"),
+    ],
+)
+def test_bad_simulator_settings(said: Callable[..., str], override: str, wanted: str) -> None:
+    message = said(lambda cfg: instantiate(cfg.sim), override)
+    assert wanted in message
+    assert "config key sim" in message
+
+
+@pytest.mark.parametrize("seed", ["-1", "abc", "1.5", "null", str(2**32)])
+def test_a_seed_that_is_none(said: Callable[..., str], seed: str) -> None:
+    message = said(lambda cfg: None, f"seed={seed}")
+    assert message.startswith("Expected seed to be a whole number from 0 to 4294967295, got")
+    assert message.endswith("set seed")
+
+
+def test_a_value_of_the_wrong_kind_names_its_place(said: Callable[..., str]) -> None:
+    message = said(lambda cfg: instantiate(cfg.data), "data.generator.frames=many")
+    assert message.startswith("Expected")
+    assert "(config key data.generator)" in message
+
+
+def test_a_value_that_must_be_given(said: Callable[..., str]) -> None:
+    message = said(lambda cfg: cfg.data.root, "data=dsec")
+    assert message == "Expected a value for data.root, got none; set data.root=..."
+
+
+def test_a_place_that_cannot_be_written_names_its_key(
+    said: Callable[..., str], tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    message = said(
+        lambda cfg: Path(cfg.paths.runs, "dsec_mini").mkdir(parents=True),
+        f"paths.runs={tmp_path / 'file'}",
+    )
+    assert message.startswith(f"Expected to read and write {tmp_path / 'file'}")
+    assert message.endswith("set paths.runs")
+
+
+def test_a_mistake_of_ours_keeps_its_traceback() -> None:
+    def broken(cfg: DictConfig) -> None:
+        raise TypeError("ours")
+
+    with pytest.raises(TypeError, match="ours"):
+        explained(broken)(composed())
