@@ -15,6 +15,7 @@ from eqs.pipelines.runs import finished_runs
 
 CONFIGS = Path(eqs.__file__).parent.parent / "configs"
 
+
 class Interrupted(Exception):
     """Stands for a power cut."""
 
@@ -68,10 +69,13 @@ def test_a_run_reports_both_test_streams(trained: dict[str, dict]) -> None:
 
 @pytest.mark.slow
 def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, dict]) -> None:
-    stamps = [run.weights.stat().st_mtime_ns for run in finished_runs(place / "runs/dsec_mini_smoke")]
+    def stamps() -> list[int]:
+        runs = finished_runs(place / "runs/dsec_mini_smoke")
+        return [run.weights.stat().st_mtime_ns for run in runs]
+
+    before = stamps()
     assert train(configured(place, "sim=esim")) == trained["esim"]
-    again = [run.weights.stat().st_mtime_ns for run in finished_runs(place / "runs/dsec_mini_smoke")]
-    assert again == stamps
+    assert stamps() == before
 
 
 @pytest.mark.slow

@@ -52,4 +52,5 @@ def test_imports_run_downwards(path: Path) -> None:
 
 
 def test_an_upward_import_would_be_found() -> None:
-    assert imported_packages("from eqs.tasks import x\nimport eqs.models.rvt") == {"tasks", "models"}
+    source = "from eqs.tasks import x\nimport eqs.models.rvt"
+    assert imported_packages(source) == {"tasks", "models"}
