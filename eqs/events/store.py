@@ -17,7 +17,7 @@ import hdf5plugin
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.events.stream import FIELDS, Events
+from eqs.events.stream import FIELDS, Events, as_field
 
 # Windows of some ten thousand events read fastest from chunks of this length: larger chunks are
 # decompressed in vain, smaller ones cost a call each.
@@ -120,7 +120,7 @@ class EventReader:
         try:
             first, t = file.times(start_us - file.offset_us, stop_us - file.offset_us)
             rows = slice(first, first + len(t))
-            fields = {name: file.columns[name][rows].astype(FIELDS[name]) for name in "xyp"}
+            fields = {name: as_field(name, file.columns[name][rows]) for name in "xyp"}
             events = Events(t + file.offset_us, **fields, height=file.height, width=file.width)
         except (OSError, ValueError) as error:
             raise ValueError(f"{self.path}: {error}") from error
@@ -144,7 +144,9 @@ class _Handles:
             self.columns = {name: self.file[f"events/{name}"] for name in FIELDS}
             self._check_columns(path)
             self.count = len(self.columns["t"])
-            self.offset_us = int(self.file["t_offset"][()]) if "t_offset" in self.file else 0
+            self.offset_us = 0
+            if "t_offset" in self.file:
+                self.offset_us = _whole_number(self.file["t_offset"], f"t_offset in {path}")
             self.index = self.file["ms_to_idx"][:].astype(np.int64)
             self._check_index(path)
             self.height = self._side(path, "height", height)
@@ -171,7 +173,7 @@ class _Handles:
         low = max(int(self.index[min(first_ms, len(self.index) - 1)]) - 1, 0)
         high = self.count if stop_ms >= len(self.index) else int(self.index[stop_ms]) + 1
         high = min(high, self.count)
-        t = self.columns["t"][low:high].astype(np.int64)
+        t = as_field("t", self.columns["t"][low:high])
         if np.any(t[1:] < t[:-1]):
             raise ValueError(
                 f"expected events sorted by time, got time running backwards between event {low} "
@@ -195,12 +197,13 @@ class _Handles:
             )
 
     def _check_columns(self, path: Path) -> None:
-        for name, column in self.columns.items():
+        stored = {f"events/{name}": STORED_TYPES[name] for name in self.columns}
+        for name, dtype in {**stored, "ms_to_idx": np.uint64}.items():
+            column = self.file[name]
             if column.ndim != 1 or column.dtype.kind not in "uib":
                 raise ValueError(
-                    f"Expected events/{name} in {path} to be a row of whole numbers, got "
-                    f"{column.dtype} of shape {column.shape}; convert it to "
-                    f"{np.dtype(STORED_TYPES[name])}"
+                    f"Expected {name} in {path} to be a row of whole numbers, got "
+                    f"{column.dtype} of shape {column.shape}; convert it to {np.dtype(dtype)}"
                 )
         lengths = {name: len(column) for name, column in self.columns.items()}
         if len(set(lengths.values())) > 1:
@@ -219,10 +222,11 @@ class _Handles:
             )
 
     def _check_times(self, path: Path) -> None:
-        if self.count and (self.start_us < 0 or int(self.columns["t"][0]) < 0):
+        if self.count and min(self.start_us, self.start_us - self.offset_us) < 0:
             raise ValueError(
                 f"Expected times of zero or more in {path}, got {self.start_us} us for the first "
-                "event; shift the stream and write the file again"
+                f"event ({self.start_us - self.offset_us} in events/t, {self.offset_us} in "
+                "t_offset); shift the stream and write the file again"
             )
         if self.stop_us < self.start_us:
             raise ValueError(
@@ -233,17 +237,19 @@ class _Handles:
 
     def _side(self, path: Path, name: str, given: int | None) -> int:
         stored = self.file.attrs.get(name)
+        if stored is not None:
+            stored = _whole_number(stored, f"the attribute {name} of {path}")
         if stored is None and given is None:
             raise ValueError(
                 f"Expected the sensor's {name} for {path}, which does not carry it; pass {name}= "
                 "or set data.size"
             )
-        if stored is not None and given is not None and int(stored) != given:
+        if stored is not None and given is not None and stored != given:
             raise ValueError(
-                f"Expected a sensor with {name} {given}, got {int(stored)} in {path}; "
+                f"Expected a sensor with {name} {given}, got {stored} in {path}; "
                 "set data.size to the size of the recording"
             )
-        return int(stored) if given is None else given
+        return stored if given is None else given
 
 
 class EventWriter:
@@ -386,6 +392,17 @@ def _top_rows(events: Events, rows: int) -> Events:
     keep = events.y < rows
     fields = {name: getattr(events, name)[keep] for name in FIELDS}
     return Events(**fields, height=rows, width=events.width)
+
+
+def _whole_number(node: Any, what: str) -> int:  # noqa: ANN401 - whatever a file holds
+    """The number in a dataset or attribute that holds one."""
+    value = np.asarray(node[()] if isinstance(node, h5py.Dataset) else node)
+    if isinstance(node, h5py.Group) or value.size != 1 or value.dtype.kind not in "ui":
+        raise ValueError(
+            f"Expected {what} to be one whole number, got {value.dtype} of shape {value.shape}; "
+            "write the file again"
+        )
+    return int(value.item())
 
 
 def _open_hdf5(path: Path) -> h5py.File:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,26 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 FIELDS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8}
+
+
+def as_field(name: str, values: NDArray[Any]) -> NDArray[Any]:
+    """Numbers as the type of an event field, t, x, y or p.
+
+    Raises:
+        ValueError: a value is not a whole number or does not fit the field.
+    """
+    dtype = FIELDS[name]
+    if np.can_cast(values.dtype, dtype, "safe"):
+        return np.ascontiguousarray(values, dtype)
+    with np.errstate(invalid="ignore"):
+        array = values.astype(dtype)
+    if np.array_equal(array, values):
+        return np.ascontiguousarray(array)
+    raise ValueError(
+        f"Expected events.{name} to hold whole numbers that fit {np.dtype(dtype)}, got values "
+        f"from {values.min()} to {values.max()}; use microseconds for t, pixels for x and y, "
+        "0 and 1 for p"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +99,7 @@ class Events:
                 f"and y up to {y}; give the true sensor size"
             )
         if p > 1:
-            raise ValueError(f"Expected polarities 0 and 1, got {p}")
+            raise ValueError(f"Expected polarities 0 and 1, got {p}; write 1 for brighter, 0 else")
 
     @classmethod
     def from_arrays(
@@ -97,17 +117,8 @@ class Events:
         Raises:
             ValueError: a value is not a whole number or does not fit its field.
         """
-        fields = {}
-        for name, values in {"t": t, "x": x, "y": y, "p": p}.items():
-            raw = np.asarray(values)
-            with np.errstate(invalid="ignore"):
-                array = raw.astype(FIELDS[name])
-            if len(raw) and not np.array_equal(array.astype(raw.dtype), raw):
-                raise ValueError(
-                    f"Expected events.{name} to hold whole numbers that fit "
-                    f"{np.dtype(FIELDS[name])}, got values from {raw.min()} to {raw.max()}"
-                )
-            fields[name] = np.ascontiguousarray(array)
+        given = {"t": t, "x": x, "y": y, "p": p}
+        fields = {name: as_field(name, np.asarray(values)) for name, values in given.items()}
         return cls(**fields, height=height, width=width)
 
     @classmethod

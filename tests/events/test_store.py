@@ -32,7 +32,7 @@ def plain_file(path, t=(0, 1500), x=(1, 2), y=(1, 2), p=(0, 1), ms_to_idx=(0, 1)
                 file[f"events/{name}"] = np.asarray(values)
         if ms_to_idx is not None:
             file["ms_to_idx"] = np.asarray(ms_to_idx, np.uint64)
-        file["t_offset"] = np.int64(t_offset)
+        file["t_offset"] = t_offset if isinstance(t_offset, str) else np.int64(t_offset)
         file.attrs.update(**{"height": 24, "width": 32, **of})
     return path
 
@@ -227,6 +227,15 @@ def test_foreign_file(tmp_path):
         ({"t": (0.0, 0.1)}, "events/t .* whole numbers, got float64"),
         ({"x": (1,)}, "one length .*'x': 1"),
         ({"ms_to_idx": (0, 5)}, "ms_to_idx .*rise from 0 to at most 2"),
+        (
+            {"ms_to_idx": ((0, 1),)},
+            r"ms_to_idx .* row of whole numbers, got uint64 of shape \(1, 2\)",
+        ),
+        ({"t_offset": (1, 2, 3)}, r"t_offset .* one whole number, got int64 of shape \(3,\)"),
+        ({"t_offset": "noon"}, "t_offset .* one whole number, got .S4 of shape"),
+        ({"p": np.int8([-1, 1])}, r"events\.p .* fit uint8, got values from -1 to 1"),
+        ({"x": np.int32([1, 65541])}, r"events\.x .* fit uint16, got values from 1 to 65541"),
+        ({"t": (-5, 1500), "t_offset": 9000}, "zero or more.*-5 in events/t, 9000 in t_offset"),
     ],
 )
 def test_bad_contents(tmp_path, contents, message):
@@ -234,6 +243,14 @@ def test_bad_contents(tmp_path, contents, message):
     with pytest.raises(ValueError, match=message) as caught:
         Events.load(path)
     assert str(path) in str(caught.value)
+
+
+def test_attributes_that_are_no_sizes(tmp_path):
+    path = plain_file(tmp_path / "e.h5")
+    with h5py.File(path, "r+") as file:
+        file.attrs["height"] = "tall"
+    with pytest.raises(ValueError, match=r"attribute height of .*one whole number"):
+        Events.load(path)
 
 
 def test_index_that_hides_events_is_noticed(tmp_path):
