@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,9 @@ class Augmentation:
         most_zoom_in: largest factor, drawn uniformly from 1.
         most_zoom_out: largest factor, drawn uniformly from 1.
 
+    Raises:
+        ValueError: a probability or share lies outside 0 to 1, or a factor below 1.
+
     Source: Gehrig and Scaramuzza, CVPR 2023, released configuration.
     """
 
@@ -81,6 +84,17 @@ class Augmentation:
     stream_zoom_probability: float = 0.5
     most_zoom_in: float = 1.5
     most_zoom_out: float = 1.2
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            low, high = (1.0, np.inf) if field.name.startswith("most_") else (0.0, 1.0)
+            if not low <= value <= high:
+                raise ValueError(
+                    f"Expected {field.name} from {low:g} to {high:g}, got {value}; "
+                    f"set datamodule.augmentation.{field.name}"
+                )
 
     def draw(
         self,

@@ -16,6 +16,7 @@ from eqs.data.datasets import (
     EvaluationDataset,
     TrainingDataset,
     WindowSource,
+    check_boxes,
 )
 from eqs.data.labels import LabelProtocol
 from eqs.data.recording import Recording
@@ -34,6 +35,19 @@ class EventPaths(Protocol):
 
     def path(self, recording: Recording) -> Path:
         """The recording's event file."""
+
+
+def check_whole_numbers(values: Mapping[str, object], least: int) -> None:
+    """Refuse settings that are no whole numbers from `least` on, by their configuration keys.
+
+    Raises:
+        ValueError: one of them is none.
+    """
+    for key, value in values.items():
+        if not isinstance(value, int) or value < least:
+            raise ValueError(
+                f"Expected {key} to be a whole number of at least {least}, got {value!r}; set {key}"
+            )
 
 
 class StepSampler(Sampler[int]):
@@ -87,6 +101,9 @@ class EventDataModule(lightning.LightningDataModule):
         count_cutoff: a count stops growing here.
         evaluation_length: windows per evaluation item; results do not depend on it.
         num_workers: processes that read beside the training; batches do not depend on it.
+
+    Raises:
+        ValueError: a number is not a whole one or too small.
     """
 
     def __init__(
@@ -111,12 +128,40 @@ class EventDataModule(lightning.LightningDataModule):
     ) -> None:
         """Keep the parts; nothing is read yet."""
         super().__init__()
+        positive = {
+            "recipe.epochs": epochs,
+            "recipe.steps_per_epoch": steps_per_epoch,
+            "recipe.batch_size": batch_size,
+            "recipe.sequence_length": sequence_length,
+            "datamodule.bins": bins,
+            "datamodule.window_us": window_us,
+            "datamodule.count_cutoff": count_cutoff,
+        }
+        check_whole_numbers(positive, least=1)
+        check_whole_numbers({"datamodule.num_workers": num_workers, "seed": seed}, least=0)
         self.dataset, self.protocol, self.source, self.tests = dataset, protocol, source, tests
         self.binning = Binning(bins=bins, window_us=window_us, count_cutoff=count_cutoff)
         self.seed, self.batch_size, self.sequence_length = seed, batch_size, sequence_length
         self.steps_per_epoch, self.epochs = steps_per_epoch, epochs
         self.sampling, self.augmentation = sampling, augmentation
         self.evaluation_length, self.num_workers = evaluation_length, num_workers
+
+    def prepare_data(self) -> None:
+        """Open every event file before the first step, so that no fault waits for the last test.
+
+        Raises:
+            FileNotFoundError: an event file is missing.
+            ValueError: an event file is damaged or runs on another clock than its frames, or the
+                test recordings have no boxes.
+        """
+        streams = [("train", self.source), ("val", self.source)]
+        streams += [("test", events) for events in self.tests.values()]
+        for split, events in streams:
+            sources = self.sources(split, events)
+            for source in sources:
+                source.check_events()
+            if split == "test":
+                check_boxes(sources)
 
     def training_dataset(self, rank: int = 0, world_size: int = 1) -> TrainingDataset:
         """The training batches of one process."""

@@ -94,6 +94,25 @@ class WindowSource:
             count_cutoff=self.binning.count_cutoff,
         )
 
+    def check_events(self) -> None:
+        """Open the event file and see whether its events belong to the frames.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: the file is damaged, or no event lies between the first and last frame.
+        """
+        if not len(self):
+            return
+        first, last = (int(time) for time in self.recording.frame_times_us[[0, -1]])
+        with self.reader as events:
+            apart = events.start_us > last or events.stop_us <= first
+            if len(events) and apart:
+                raise ValueError(
+                    f"Expected events and frames of one clock in {self.events_path}, got events "
+                    f"from {events.start_us} to {events.stop_us} us and frames from {first} to "
+                    f"{last} us; correct t_offset or the frames' times"
+                )
+
     def boxes(self, index: int) -> LabelledBoxes:
         """Boxes x1 y1 x2 y2 and classes at the end of one window."""
         rows = self.recording.tracks_at(int(self.windows_us[index, 1]))
@@ -276,6 +295,20 @@ def collate(samples: Sequence[Sample], length: int) -> Batch:
         "labels": torch.from_numpy(labels),
         "labelled": torch.from_numpy(labelled),
     }
+
+
+def check_boxes(sources: Sequence[WindowSource]) -> None:
+    """Refuse recordings in which there is nothing to find, on which no detector can be tested.
+
+    Raises:
+        ValueError: no recording has a box that counts.
+    """
+    if not any(len(source.boxes(index)[0]) for source in sources for index in range(len(source))):
+        names = ", ".join(source.recording.name for source in sources)
+        raise ValueError(
+            f"Expected labelled boxes to test on, got none that counts in {names}; set data.root "
+            "or data.splits to labelled recordings, or protocol.classes and sizes to their boxes"
+        )
 
 
 def check_sizes(sources: Sequence[WindowSource]) -> None:

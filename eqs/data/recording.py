@@ -164,13 +164,14 @@ def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
 
 def _whole_numbers(path: Path) -> NDArray[np.int64]:
     """The numbers of a text file, one row per line that is not a comment."""
-    lines = [line for line in path.read_text().splitlines() if line.strip()]
-    rows = [line.split(",") for line in lines if not line.lstrip().startswith("#")]
     try:
+        lines = [line for line in path.read_text().splitlines() if line.strip()]
+        rows = [line.split(",") for line in lines if not line.lstrip().startswith("#")]
         return np.array([[int(number) for number in row] for row in rows], np.int64)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:  # no text, no number, too large, or rows uneven
         raise ValueError(
-            f"Expected whole microseconds in {path}, got: {error}; write one row a line"
+            f"Expected whole microseconds in {path}, got a file that says otherwise ({error}); "
+            "write one row a line"
         ) from error
 
 
@@ -216,6 +217,16 @@ def _tracks(folder: Path, frame_times_us: NDArray[np.int64]) -> NDArray[np.void]
         raise ValueError(
             f"Expected labels with the fields {', '.join(TRACK_FIELDS)} in {path}, got none named "
             f"{', '.join(missing)}; replace the file"
+        )
+    if tracks.ndim != 1 or not all(np.isfinite(tracks[name]).all() for name in TRACK_FIELDS):
+        raise ValueError(
+            f"Expected a row of labels with finite numbers in {path}, got shape {tracks.shape} "
+            "or NaN; replace the file"
+        )
+    if len(tracks) and not len(frame_times_us):
+        raise ValueError(
+            f"Expected {FRAME_TIMES} beside the labels of {folder}, found none; add the time of "
+            "each labelled frame in microseconds, one a line"
         )
     tracks = tracks[np.argsort(tracks["t"], kind="stable")]
     if len(tracks) and not np.isin(tracks["t"].astype(np.int64), frame_times_us).any():

@@ -132,3 +132,17 @@ def test_zooming_in_on_a_box_larger_than_the_part():
     for view in draws(50, boxes, zoom_probability=1.0, zoom_in_share=1.0):
         assert 0 <= view.x <= WIDTH - view.columns
         assert 0 <= view.y <= HEIGHT - view.rows
+
+
+@pytest.mark.parametrize(
+    ("choice", "message"),
+    [
+        ({"flip_probability": 2}, r"flip_probability from 0 to 1, got 2; set datamodule\.augm"),
+        ({"zoom_in_share": -0.1}, "zoom_in_share from 0 to 1, got -0.1"),
+        ({"most_zoom_out": 0.5}, "most_zoom_out from 1 to inf, got 0.5"),
+        ({"most_zoom_in": float("nan")}, "most_zoom_in from 1 to inf, got nan"),
+    ],
+)
+def test_impossible_choices_are_refused(choice, message):
+    with pytest.raises(ValueError, match=message):
+        Augmentation(**choice)

@@ -1,5 +1,6 @@
 """Loaders: each phase reads its own events, and epochs go on where they stopped."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -162,3 +163,41 @@ def test_resumed_training_sees_the_batches_that_were_left(module, tmp_path, at_t
     with pytest.raises(RuntimeError, match="interrupted"):
         fit(module, tmp_path / "part", interrupted_at=8, **options)
     assert fit(module, tmp_path / "part", resume=True, **options) == whole[6:]
+
+
+@pytest.mark.parametrize(
+    ("choice", "key"),
+    [
+        ({"epochs": 0}, "recipe.epochs"),
+        ({"steps_per_epoch": "ten"}, "recipe.steps_per_epoch"),
+        ({"batch_size": None}, "recipe.batch_size"),
+        ({"window_us": 0}, "datamodule.window_us"),
+        ({"num_workers": -1}, "datamodule.num_workers"),
+        ({"seed": -1}, "seed"),
+    ],
+)
+def test_impossible_numbers_are_refused_by_their_keys(module, choice, key):
+    with pytest.raises(ValueError, match=rf"Expected {key} to be a whole number .*; set {key}$"):
+        module(**choice)
+
+
+def test_faults_of_any_recording_are_found_before_the_first_step(module, dataset):
+    module().prepare_data()
+    path = dataset.root / "test_b" / "events/left/events.h5"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:3000])
+    with pytest.raises(ValueError, match=r"test_b/.*events\.h5 to be a whole HDF5 file"):
+        module().prepare_data()
+    path.write_bytes(whole)
+    with EventReader(path) as reader:
+        later = reader.read().shifted(10_000_000)
+    later.save(path)
+    with pytest.raises(ValueError, match=r"one clock in .*test_b.* got events from 10995"):
+        module().prepare_data()
+
+
+def test_nothing_to_find_is_no_test(module, dataset):
+    for name in ("test_a", "test_b"):
+        shutil.rmtree(dataset.root / name / "object_detections")
+    with pytest.raises(ValueError, match=r"labelled boxes to test on, got none .* test_a, test_b"):
+        module().prepare_data()

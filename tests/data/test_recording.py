@@ -107,9 +107,46 @@ def emptied(folder):
     folder.mkdir()
 
 
+def no_text(folder):
+    (folder / "images/timestamps.txt").write_bytes(b"\xff\x00" * 9)
+
+
+def too_large(folder):
+    path = folder / "images/timestamps.txt"
+    path.write_text("\n".join([*path.read_text().split()[:-1], "9" * 30]))
+
+
+def uneven(folder):
+    path = folder / "images/timestamps.txt"
+    path.write_text("0, 1\n" + path.read_text())
+
+
+def square_tracks(folder):
+    path = folder / "object_detections/left/tracks.npy"
+    tracks = np.load(path)
+    np.save(path, np.stack([tracks, tracks]))
+
+
+def undefined_tracks(folder):
+    path = folder / "object_detections/left/tracks.npy"
+    tracks = np.load(path)
+    tracks["w"][1] = np.nan
+    np.save(path, tracks)
+
+
+def labels_alone(folder):
+    shutil.rmtree(folder / "images")
+
+
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
+        (no_text, "whole microseconds in .*timestamps.txt"),
+        (too_large, "whole microseconds in .*timestamps.txt"),
+        (uneven, "whole microseconds in .*timestamps.txt"),
+        (square_tracks, r"row of labels with finite numbers in .*shape \(2, "),
+        (undefined_tracks, "finite numbers in .*tracks.npy.* or NaN"),
+        (labels_alone, "timestamps.txt beside the labels of .*found none"),
         (remove_times, "timestamps.txt beside the 6 frames of .*found none"),
         (one_time_less, "one timestamp per frame .*got 2 lines .* and 6 frames"),
         (backwards, "rising times of zero or more"),
@@ -126,8 +163,9 @@ def emptied(folder):
 def test_faults_are_named(tmp_path, make_recording, damage, message):
     folder = make_recording(tmp_path / "a")
     damage(folder)
-    with pytest.raises(ValueError, match=message):
-        Recording.load(folder)
+    with pytest.raises(ValueError, match=message) as caught:
+        Recording.load(folder, 24, 32)
+    assert str(folder) in str(caught.value)
 
 
 def test_wrong_sizes(tmp_path, make_recording):
