@@ -68,9 +68,7 @@ class Centre:
         """
         source = Path(path)
         if not source.is_file():
-            raise FileNotFoundError(
-                f"Expected a centre at {source}, got no file; set metric.centre"
-            )
+            raise FileNotFoundError(f"Expected a centre at {source}, got no file; set eqs.centre")
         try:
             with source.open("rb") as file, np.load(file, allow_pickle=False) as data:
                 stages = tuple(sorted(int(key[6:]) for key in data if key.startswith("stage_")))
@@ -99,7 +97,7 @@ class Centre:
         if missing:
             raise ValueError(
                 f"Expected a centre of stages {tuple(stages)}, got one of {self.stages}; "
-                "set metric.centre or metric.stages"
+                "set eqs.centre or eqs.stages"
             )
         means = dict(zip(self.stages, self.means, strict=True))
         return tuple(torch.from_numpy(means[stage]) for stage in stages)
@@ -173,5 +171,5 @@ class _ChannelMean:
             raise ValueError("Expected at least one real recording to centre on, got none")
         mean = (self.total / self.count).float().numpy()
         if not np.isfinite(mean).all():
-            raise ValueError("Expected finite features, got NaN or infinity; set metric.weights")
+            raise ValueError("Expected finite features, got NaN or infinity; set eqs.weights")
         return mean

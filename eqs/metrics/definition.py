@@ -69,23 +69,24 @@ class Definition:
     def __post_init__(self) -> None:
         """Reject what no score can be computed from."""
         if self.tap not in TAPS:
-            raise ValueError(f"Expected a tap among {TAPS}, got {self.tap!r}; set metric.tap")
+            raise ValueError(f"Expected a tap among {TAPS}, got {self.tap!r}; set eqs.tap")
+        if any(not isinstance(stage, int) for stage in self.stages):
+            raise ValueError(
+                f"Expected stages as whole numbers, got {self.stages}; set eqs.stages=[1,2,3]"
+            )
         if not self.stages or list(self.stages) != sorted({*self.stages}) or min(self.stages) < 1:
             raise ValueError(
-                f"Expected stages counted from 1 in rising order, got {self.stages}; "
-                "set metric.stages"
+                f"Expected stages counted from 1 in rising order, got {self.stages}; set eqs.stages"
             )
         if self.span not in ("window", "events"):
-            raise ValueError(f"Expected span window or events, got {self.span!r}; set metric.span")
-        for name in ("patch_size", "bins", "window_us", "count_cutoff"):
-            if getattr(self, name) < 1:
-                value = getattr(self, name)
-                raise ValueError(f"Expected {name} of at least 1, got {value}; set metric.{name}")
-        if self.warmup_windows < 0:
-            raise ValueError(
-                f"Expected no negative warm-up, got {self.warmup_windows}; "
-                "set metric.warmup_windows"
-            )
+            raise ValueError(f"Expected span window or events, got {self.span!r}; set eqs.span")
+        for name in ("patch_size", "bins", "window_us", "count_cutoff", "warmup_windows"):
+            value, least = getattr(self, name), int(name != "warmup_windows")
+            if not isinstance(value, int) or value < least:
+                raise ValueError(
+                    f"Expected {name} to be a whole number of at least {least}, got {value!r}; "
+                    f"set eqs.{name}"
+                )
 
     @property
     def hash(self) -> str:
@@ -115,7 +116,7 @@ def weights_sha256(source: Path | str | nn.Module) -> str:
     if not isinstance(source, nn.Module):
         path = Path(source)
         if not path.is_file():
-            raise FileNotFoundError(f"Expected weights at {path}, got no file; set metric.weights")
+            raise FileNotFoundError(f"Expected weights at {path}, got no file; set eqs.weights")
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     digest = hashlib.sha256()

@@ -98,7 +98,7 @@ class EventQualityScore(Metric):
         if (weights is None) == (backbone is None):
             raise ValueError(
                 "Expected either weights or a backbone, got "
-                f"{'neither' if weights is None else 'both'}; set metric.weights to a checkpoint "
+                f"{'neither' if weights is None else 'both'}; set eqs.weights to a checkpoint "
                 'trained on real events, or to "random"'
             )
         definition = Definition(
@@ -237,9 +237,7 @@ def load_backbone(
 def _check_fit(found: str | int, wanted: str | int, key: str) -> None:
     if found != wanted:
         what = "a backbone of size" if key == "size" else "weights for input channels"
-        raise ValueError(
-            f"Expected {what} {wanted}, got {found}; set metric.{key} or metric.weights"
-        )
+        raise ValueError(f"Expected {what} {wanted}, got {found}; set eqs.{key} or eqs.weights")
 
 
 def _as_centre(
@@ -252,7 +250,7 @@ def _as_centre(
     if len(centre) != len(stages):
         raise ValueError(
             f"Expected a centre for each of the stages {tuple(stages)}, got {len(centre)}; "
-            "set metric.centre"
+            "set eqs.centre"
         )
     means = tuple(np.asarray(torch.as_tensor(mean).cpu(), dtype=np.float32) for mean in centre)
     return Centre(tap=tap, stages=tuple(stages), means=means)

@@ -42,7 +42,7 @@ def strides_of(backbone: object, stages: Sequence[int]) -> tuple[int, ...]:
     strides = getattr(backbone, "strides", RVT_STRIDES)
     if max(stages) > len(strides):
         raise ValueError(
-            f"Expected stages up to {len(strides)}, got {tuple(stages)}; set metric.stages"
+            f"Expected stages up to {len(strides)}, got {tuple(stages)}; set eqs.stages"
         )
     return tuple(int(strides[stage - 1]) for stage in stages)
 

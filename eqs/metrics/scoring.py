@@ -69,12 +69,12 @@ class Reading:
             wanted, got = ("a", "none") if self.centre is None else ("no", "one")
             raise ValueError(
                 f"Expected {wanted} centre for a definition with centred={self.definition.centred},"
-                f" got {got}; set metric.centre or metric.centred"
+                f" got {got}; set eqs.centre or eqs.centred"
             )
         if self.centre is not None and self.centre.tap != self.definition.tap:
             raise ValueError(
                 f"Expected a centre of tap {self.definition.tap}, got one of {self.centre.tap}; "
-                "set metric.centre or metric.tap"
+                "set eqs.centre or eqs.tap"
             )
 
     @property
@@ -223,7 +223,7 @@ class _Tally:
         by_stage = curve[self.warmup :].mean(dim=0)
         if not torch.isfinite(by_stage).all():
             raise ValueError(
-                "Expected finite features, got NaN or infinity; set metric.weights to a sound "
+                "Expected finite features, got NaN or infinity; set eqs.weights to a sound "
                 "checkpoint"
             )
         image = combine_maps(

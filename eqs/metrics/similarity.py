@@ -65,7 +65,7 @@ def patch_cosine(a: Tensor, b: Tensor, centre: Tensor | None = None, eps: float 
         if centre.shape != (a.shape[-3],):
             raise ValueError(
                 f"Expected a centre of {a.shape[-3]} channels, got shape {tuple(centre.shape)}; "
-                "set metric.centre to the centre of this backbone and tap"
+                "set eqs.centre to the centre of this backbone and tap"
             )
         column = centre.to(a)[:, None, None]
         a, b = a - column, b - column

@@ -85,7 +85,7 @@ def window_starts(
     if count < 1:
         raise ValueError(
             f"Expected at least one window of {window_us} us, got an overlap of {stop - start} us; "
-            "give longer streams or set metric.window_us"
+            "give longer streams or set eqs.window_us"
         )
     return start + window_us * np.arange(count, dtype=np.int64)
 
@@ -141,7 +141,7 @@ def _check_histograms(tensors: Sequence[Tensor], bins: int) -> None:
     if len(shapes[0]) != 4 or shapes[0][1] != 2 * bins or not shapes[0][0]:
         raise ValueError(
             f"Expected histograms of shape (windows, {2 * bins}, height, width) with at least one "
-            f"window, got {shapes[0]}; set metric.bins"
+            f"window, got {shapes[0]}; set eqs.bins"
         )
     if not all(torch.isfinite(tensor).all() for tensor in tensors if tensor.is_floating_point()):
         raise ValueError("Expected finite histograms, got NaN or infinity")

@@ -48,13 +48,21 @@ def test_warmup_is_at_most_a_quarter(windows, warmup):
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
-        ({"tap": "nose"}, "tap among .* got 'nose'; set metric.tap"),
+        ({"tap": "nose"}, "tap among .* got 'nose'; set eqs.tap"),
         ({"stages": ()}, "stages counted from 1"),
         ({"stages": (2, 1)}, "stages counted from 1"),
         ({"stages": (0, 1)}, "stages counted from 1"),
+        ({"stages": ("a", "b")}, r"stages as whole numbers, got \('a', 'b'\); set eqs.stages"),
+        (
+            {"patch_size": "three"},
+            "patch_size to be a whole number .*got 'three'; set eqs.patch_size",
+        ),
         ({"span": "all"}, "span window or events"),
-        ({"window_us": 0}, "window_us of at least 1"),
-        ({"warmup_windows": -1}, "no negative warm-up"),
+        (
+            {"window_us": 0},
+            "window_us to be a whole number of at least 1, got 0; set eqs.window_us",
+        ),
+        ({"warmup_windows": -1}, "whole number of at least 0, got -1; set eqs.warmup_windows"),
     ],
 )
 def test_impossible_choices_are_refused(choice, message):
@@ -75,5 +83,5 @@ def test_weights_hash_sees_values_and_names(tmp_path):
 
 
 def test_missing_weights_are_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"gone.ckpt, got no file; set metric.weights"):
+    with pytest.raises(FileNotFoundError, match=r"gone.ckpt, got no file; set eqs.weights"):
         weights_sha256(tmp_path / "gone.ckpt")

@@ -209,13 +209,13 @@ def test_refusals_of_the_metric(backbone, make_events, tmp_path):
         metric.update(make_events(1, width=30), make_events(2))
     with pytest.raises(ValueError, match="overlap in time"):
         metric.update(make_events(1), make_events(2).shifted(5_000_000))
-    with pytest.raises(ValueError, match=r"weights or a backbone, got neither; set metric.weights"):
+    with pytest.raises(ValueError, match=r"weights or a backbone, got neither; set eqs.weights"):
         EventQualityScore()
     with pytest.raises(ValueError, match=r"weights or a backbone, got both"):
         EventQualityScore("random", backbone=backbone)
     with pytest.raises(ValueError, match="Expected a centre for a definition with centred=True"):
         EventQualityScore(backbone=backbone, centred=True)
-    with pytest.raises(FileNotFoundError, match=r"gone.npz, got no file; set metric.centre"):
+    with pytest.raises(FileNotFoundError, match=r"gone.npz, got no file; set eqs.centre"):
         EventQualityScore(backbone=backbone, centre=tmp_path / "gone.npz")
     with pytest.raises(ValueError, match=r"each of the stages \(1, 2, 3\), got 1"):
         EventQualityScore(backbone=backbone, centre=[torch.zeros(6)])
@@ -234,9 +234,7 @@ def test_compute_needs_an_update(backbone):
 def test_broken_weights_are_never_a_silent_nan(backbone, make_events):
     with torch.no_grad():
         backbone.convolutions[1].weight[0] = torch.nan
-    with pytest.raises(
-        ValueError, match=r"finite features, got NaN or infinity; set metric.weights"
-    ):
+    with pytest.raises(ValueError, match=r"finite features, got NaN or infinity; set eqs.weights"):
         score_streams(backbone, make_events(1), [make_events(2)], readings("hidden"))
     with pytest.raises(ValueError, match="finite features"):
         feature_centres(backbone, [make_events(1)], taps=["hidden"], definition=BASE)

@@ -73,7 +73,7 @@ def test_histograms_pass_through():
     ("streams", "message"),
     [
         ([torch.zeros(2, 4, 3, 3), torch.zeros(1, 4, 3, 3)], "histograms of one shape"),
-        ([torch.zeros(2, 6, 3, 3)], r"shape \(windows, 4, height, width\).*set metric.bins"),
+        ([torch.zeros(2, 6, 3, 3)], r"shape \(windows, 4, height, width\).*set eqs.bins"),
         ([torch.zeros(0, 4, 3, 3)], "at least one window"),
         ([torch.full((2, 4, 3, 3), torch.nan)], "finite histograms, got NaN"),
         ([torch.zeros(2, 4, 3, 3), at(1, 2)], "got both; convert one of them"),
