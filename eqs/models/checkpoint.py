@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -13,6 +13,8 @@ STEM = "backbone.stages.0.downsample_cf2cl.conv.weight"
 CLASS_BIAS = "yolox_head.cls_preds.0.bias"
 CLASS_LAYERS = "yolox_head.cls_preds."
 LISTED = 5
+KEYS = "model.weights or eqs.weights"
+RESUMED = {"state_dict", "optimizer_states", "lr_schedulers", "pytorch-lightning_version"}
 
 
 class WeightShape(NamedTuple):
@@ -23,34 +25,44 @@ class WeightShape(NamedTuple):
     num_classes: int
 
 
-def read_weights(path: str | Path) -> dict[str, Tensor]:
+def read_weights(path: str | Path, key: str = KEYS) -> dict[str, Tensor]:
     """Detector weights by their published names, from a file.
 
     Lightning checkpoints keep them under `state_dict` behind a prefix (`mdl.` in published ones);
     entries of other modules are left out. Nothing but tensors and plain values is unpickled.
 
+    Args:
+        path: checkpoint file.
+        key: configuration key to name in errors.
+
     Raises:
         FileNotFoundError: no such file.
         ValueError: not a checkpoint, no detector in it, or several.
     """
+    return _detector_in(_content(path, key), path, key)
+
+
+def _content(path: str | Path, key: str) -> dict[str, Any]:
     if not Path(path).is_file():
-        raise FileNotFoundError(
-            f"Expected a checkpoint at {path}, got no such file; set model.weights"
-        )
+        raise FileNotFoundError(f"Expected a checkpoint at {path}, got no such file; set {key}")
     try:
         content = torch.load(path, map_location="cpu", weights_only=True)
-    except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError, ValueError) as error:
+    except (pickle.UnpicklingError, RuntimeError, OSError, EOFError, KeyError, ValueError) as error:
         raise ValueError(
             f"Expected a checkpoint of tensors and plain values in {path}, got a file that "
-            f"torch.load with weights_only=True refuses; set model.weights to another file"
+            f"torch.load with weights_only=True refuses; set {key} to another file"
         ) from error
-    entries = content.get("state_dict", content) if isinstance(content, dict) else {}
+    return content if isinstance(content, dict) else {}
+
+
+def _detector_in(content: dict[str, Any], path: str | Path, key: str) -> dict[str, Tensor]:
+    entries = content.get("state_dict", content)
     tensors = {str(name): x for name, x in entries.items() if isinstance(x, Tensor)}
     prefixes = [name.removesuffix(STEM) for name in tensors if name.endswith(STEM)]
     if len(prefixes) != 1:
         raise ValueError(
-            f"Expected one RVT detector in {path}, got {len(prefixes)}; no or several entries end "
-            f"in {STEM}"
+            f"Expected one RVT detector in {path}, got {len(prefixes)} entries that end in {STEM}; "
+            f"set {key} to a detector's checkpoint"
         )
     prefix = prefixes[0]
     return {name.removeprefix(prefix): x for name, x in tensors.items() if name.startswith(prefix)}
@@ -95,6 +107,31 @@ def load_weights(model: nn.Module, path: str | Path, *, new_class_branch: bool =
         weights = {**weights, **anew}
     _check_entries(own, weights, path)
     model.load_state_dict(weights)
+
+
+def check_resumable(model: nn.Module, path: str | Path) -> None:
+    """Refuse a checkpoint from which the training of a detector cannot go on.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: not a checkpoint of a training, or one of another detector.
+    """
+    content = _content(path, "ckpt_path")
+    weights = _detector_in(content, path, "ckpt_path")
+    classes = len(model.state_dict()[CLASS_BIAS])
+    stored = shape_of(weights, path).num_classes
+    if stored != classes:
+        raise ValueError(
+            f"Expected a training of {classes} classes to resume, got {stored} in {path}; set "
+            "ckpt_path to another, or model.weights to it with model.new_class_branch=true"
+        )
+    _check_entries(model.state_dict(), weights, path)
+    missing = sorted(RESUMED - content.keys())
+    if missing:
+        raise ValueError(
+            f"Expected a training to resume in {path}, got a file without {', '.join(missing)}; "
+            "set model.weights instead of ckpt_path to start from its weights"
+        )
 
 
 def _check_entries(own: dict[str, Tensor], weights: dict[str, Tensor], path: str | Path) -> None:

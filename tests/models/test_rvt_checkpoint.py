@@ -7,6 +7,7 @@ import torch
 from torch import nn
 
 from eqs.models import RVTDetector
+from eqs.models.checkpoint import check_resumable
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +91,40 @@ def test_files_that_are_no_checkpoints(tmp_path):
     torch.save({"state_dict": nn.Linear(1, 1).state_dict()}, tmp_path / "other.ckpt")
     with pytest.raises(ValueError, match=r"Expected one RVT detector in .*got 0"):
         RVTDetector.from_checkpoint(tmp_path / "other.ckpt")
+
+
+@pytest.fixture
+def training(tmp_path, detector):
+    def saved(*without, **changes):
+        entries = {f"model.{name}": x for name, x in detector.state_dict().items()}
+        content = {"state_dict": entries | changes, "optimizer_states": [], "lr_schedulers": []}
+        content["pytorch-lightning_version"] = "2.6.0"
+        path = tmp_path / "last.ckpt"
+        torch.save({key: x for key, x in content.items() if key not in without}, path)
+        return path
+
+    return saved
+
+
+def test_only_a_training_of_the_same_detector_resumes(training, detector):
+    check_resumable(detector, training())
+    with pytest.raises(
+        ValueError, match=r"8 classes to resume, got 2 in .*last.ckpt; set ckpt_path"
+    ):
+        check_resumable(RVTDetector("tiny", num_classes=8, in_channels=6), training())
+    with pytest.raises(ValueError, match=r"Expected the 376 entries .*set\s+model.size"):
+        check_resumable(RVTDetector("small", num_classes=2, in_channels=6), training())
+    with pytest.raises(ValueError, match=r"without optimizer_states; set model.weights instead"):
+        check_resumable(detector, training("optimizer_states"))
+
+
+def test_what_cannot_be_resumed_names_its_key(tmp_path, training, detector):
+    with pytest.raises(FileNotFoundError, match=r"nowhere.ckpt, got no such file; set ckpt_path"):
+        check_resumable(detector, tmp_path / "nowhere.ckpt")
+    path = training()
+    path.write_bytes(path.read_bytes()[:5000])
+    with pytest.raises(ValueError, match=r"refuses; set ckpt_path to another file"):
+        check_resumable(detector, path)
 
 
 class Payload:
