@@ -7,11 +7,12 @@ import logging
 import os
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeVar
 
 from hydra.errors import InstantiationException
 from omegaconf import DictConfig
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
 
 log = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -27,23 +28,59 @@ def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig],
     def run(cfg: DictConfig) -> Result:
         quiet_libraries()
         try:
+            check_seed(cfg)
             return command(cfg)
         except (ValueError, OSError, InstantiationException, OmegaConfBaseException) as error:
             if os.environ.get("HYDRA_FULL_ERROR"):
                 raise
-            log.error("%s", sentence(error))
+            log.error("%s", sentence(error, cfg))
             raise SystemExit(1) from error
 
     return run
 
 
-def sentence(error: BaseException) -> str:
-    """The message of the mistake itself, below what wraps it."""
+def check_seed(cfg: DictConfig) -> None:
+    """Refuse what is no seed to every generator that gets it.
+
+    Raises:
+        ValueError: the seed is not a whole number of 32 bits.
+    """
+    if not isinstance(cfg.seed, int) or not 0 <= cfg.seed < 2**32:
+        raise ValueError(
+            f"Expected seed to be a whole number from 0 to {2**32 - 1}, got {cfg.seed!r}; set seed"
+        )
+
+
+def sentence(error: BaseException, cfg: DictConfig) -> str:
+    """The message of the mistake itself, below what wraps it, with a key to change."""
     if isinstance(error, InstantiationException) and error.__cause__ is not None:
         where = str(error).rsplit("full_key: ", maxsplit=1)
         key = f" (config key {where[1].strip()})" if len(where) > 1 else ""
-        return sentence(error.__cause__) + key
+        return sentence(error.__cause__, cfg) + key
+    if isinstance(error, TypeError | AttributeError):  # of a constructor: a text for a number
+        return f"Expected values of the configured kinds, got another: {error}; set them anew"
+    if isinstance(error, MissingMandatoryValue):
+        return f"Expected a value for {error.full_key}, got none; set {error.full_key}=..."
+    if isinstance(error, OmegaConfBaseException):
+        return f"{str(error).splitlines()[0]} (config key {error.full_key})"
+    if isinstance(error, OSError) and error.errno is not None:
+        return (
+            f"Expected to read and write {error.filename or 'files'}, got: {error.strerror}; "
+            f"set {path_keys(error.filename, cfg)}"
+        )
     return str(error) or type(error).__name__
+
+
+def path_keys(filename: object, cfg: DictConfig) -> str:
+    """The configured places above or below a file, as keys."""
+    file = Path(str(filename)).absolute()
+    places = {key: Path(str(place)).absolute() for key, place in cfg.paths.items()}
+    keys = [
+        f"paths.{key}"
+        for key, place in places.items()
+        if file.is_relative_to(place) or place.is_relative_to(file)
+    ]
+    return " or ".join(keys or ["data.root or the keys below paths"])
 
 
 def quiet_libraries() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
@@ -221,13 +222,13 @@ def require_positive(simulator: Simulator, *names: str) -> None:
     """Refuse parameters that are not finite numbers above zero."""
     for name in names:
         value = getattr(simulator, name)
-        if not 0 < value < np.inf:
-            raise ValueError(f"Expected {name} above 0, got {value}; set sim.{name}")
+        if not (isinstance(value, Real) and 0 < value < np.inf):
+            raise ValueError(f"Expected {name} above 0, got {value!r}; set sim.{name}")
 
 
 def require_not_negative(simulator: Simulator, *names: str) -> None:
     """Refuse parameters that are not finite numbers from zero up."""
     for name in names:
         value = getattr(simulator, name)
-        if not 0 <= value < np.inf:
-            raise ValueError(f"Expected {name} of 0 or more, got {value}; set sim.{name}")
+        if not (isinstance(value, Real) and 0 <= value < np.inf):
+            raise ValueError(f"Expected {name} of 0 or more, got {value!r}; set sim.{name}")
