@@ -97,7 +97,7 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     systems = scored_systems(cfg, runs)
     for source in systems.values():
         source.prepare(recordings)
-    judge = find_judge(cfg)
+    judge = find_judge(cfg, data)
     with times.measure("score"):
         scores = score_recordings(judge, recordings, systems, data.crop_rows)
     rows = [{"simulator": systems[row["system"]].name, **row} for row in scores.rows]

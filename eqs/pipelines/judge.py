@@ -21,6 +21,7 @@ from eqs.metrics import (
     feature_centres,
     load_backbone,
 )
+from eqs.pipelines.build import Dataset
 from eqs.pipelines.runs import Run, finished_runs
 
 log = logging.getLogger(__name__)
@@ -53,14 +54,14 @@ class Judge:
         return self.readings[0]
 
 
-def find_judge(cfg: DictConfig) -> Judge:
+def find_judge(cfg: DictConfig, data: Dataset) -> Judge:
     """The configured judge, or the detector trained on the real stream of this data.
 
     Raises:
         ValueError: no weights are given and no detector was trained on a real stream.
     """
     if cfg.eqs.weights is not None:
-        return _given_judge(cfg)
+        return _given_judge(cfg, data)
     for name in dict.fromkeys([cfg.data.name, EMBEDDED_DATA]):
         for run in finished_runs(Path(cfg.paths.runs) / name):
             if run.result()["simulator"] == "real":
@@ -103,7 +104,7 @@ def _trained_judge(cfg: DictConfig, run: Run) -> Judge:
     )
 
 
-def _given_judge(cfg: DictConfig) -> Judge:
+def _given_judge(cfg: DictConfig, data: Dataset) -> Judge:
     definition = _definition(cfg, cfg.eqs.size, cfg.eqs.partition_split_32)
     backbone, digest = load_backbone(
         cfg.eqs.weights,
@@ -113,8 +114,6 @@ def _given_judge(cfg: DictConfig) -> Judge:
         seed=cfg.eqs.seed,
     )
     taps = list(dict.fromkeys([cfg.eqs.tap, *cfg.taps]))
-    data = instantiate(cfg.data)
-    data.prepare()
     training = data.recordings("train") if isinstance(data, DSECFolder) else []
     centres: dict[str, Centre] = {}
     if training:

@@ -6,7 +6,7 @@ import pandas as pd
 from rich.console import Console
 from rich.table import Table as ConsoleTable
 
-from eqs.study.layout import Table, number
+from eqs.study.layout import Table, number, scores_table
 from eqs.study.tables import MAP_COLUMNS, Drops, score_columns, summarise_eqs, summarise_study
 
 
@@ -18,7 +18,8 @@ def print_study(study: pd.DataFrame, console: Console) -> None:
 
 
 def print_eqs(eqs: pd.DataFrame, console: Console) -> None:
-    """Print every score of every system, means over sequences, with chance and ceiling."""
+    """Print the scores of every system: by sequence, then means with chance and ceiling."""
+    console.print(_drawn(scores_table(eqs), "EQS by sequence (higher is better)"))
     means = summarise_eqs(eqs)
     names = ["system", "sequences", "eqs", "eqs_chance", "eqs_ceiling", "eqs_scaled"]
     variants = [name for name in score_columns(means) if name != "eqs"]
