@@ -117,7 +117,8 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         publish(cfg, results, data, found, times.read())
     console.print(f"[bold]judge[/bold]: {judge.description} ({judge.weights_sha256[:12]})")
     console.print(f"[bold]report[/bold]: {results / 'report.html'}")
-    for phase, seconds in times.read().items():
+    phases = times.read()
+    for phase, seconds in {**phases, "together": sum(phases.values())}.items():
         console.print(f"  {phase:<24}{seconds:8.1f} s")
 
 

@@ -173,9 +173,7 @@ def summarise_study(study: pd.DataFrame) -> pd.DataFrame:
     Convention: drops and retention follow from the mean mAPs, so a row agrees with itself; `_sd`
     is the sample standard deviation, NaN with one seed.
     """
-    numbers = [
-        name for name in study.columns if name not in TEXT_COLUMNS and name not in ("seed", "seeds")
-    ]
+    numbers = [name for name in study.select_dtypes("number") if name not in ("seed", "seeds")]
     groups = study.groupby("system", sort=False)
     means = groups[numbers].mean()
     for name in ("map_sim", "map_real"):
