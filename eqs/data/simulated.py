@@ -96,6 +96,12 @@ class SimulatedEvents:
         missing = [recording for recording in recordings if not self._is_current(recording)]
         if not missing:
             return
+        blind = [recording for recording in missing if not recording.has_frames]
+        if blind:
+            raise ValueError(
+                f"Expected frames to simulate from in {blind[0].frame_folder}, got none; "
+                "set data.root to recordings with frames, or sim=real"
+            )
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(min(self.workers, len(missing)), mp_context=context) as pool:
             jobs = [pool.submit(self.simulate, recording) for recording in missing]

@@ -77,6 +77,15 @@ def test_an_interrupted_stream_leaves_no_file(tmp_path: Path, recording: Recordi
     assert not list((tmp_path / "simulated").rglob("manifest.json"))
 
 
+def test_nothing_is_simulated_where_frames_are_missing(
+    tmp_path: Path, recording: Recording
+) -> None:
+    blind = replace(recording, name="blind", frame_paths=())
+    with pytest.raises(ValueError, match=r"simulate from in .*distorted, got none; set data\.root"):
+        source(tmp_path).prepare([recording, blind])
+    assert not (tmp_path / "simulated").exists()
+
+
 def test_recorded_events_are_their_own_file(recording: Recording) -> None:
     real = RecordedEvents()
     real.prepare([recording])
