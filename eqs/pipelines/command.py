@@ -64,8 +64,9 @@ def sentence(error: BaseException, cfg: DictConfig) -> str:
     if isinstance(error, OmegaConfBaseException):
         return f"{str(error).splitlines()[0]} (config key {error.full_key})"
     if isinstance(error, OSError) and error.errno is not None:
+        reason = str(error.strerror).splitlines()[0]  # HDF5 tells the rest of its story below
         return (
-            f"Expected to read and write {error.filename or 'files'}, got: {error.strerror}; "
+            f"Expected to read and write {error.filename or 'files'}, got: {reason}; "
             f"set {path_keys(error.filename, cfg)}"
         )
     return str(error) or type(error).__name__
@@ -89,6 +90,7 @@ def quiet_libraries() -> None:
         ".*isinstance.treespec",  # torch and Lightning disagree about a name
         ".*does not have many workers",  # windows are binned faster than a laptop trains
         ".*smaller than the logging interval",
+        ".*exists and is not empty",  # as it should when a training is resumed
     ):
         warnings.filterwarnings("ignore", message=message)
     for name in ("lightning.pytorch.utilities.rank_zero", "lightning.fabric.utilities.seed"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
@@ -222,7 +221,7 @@ def require_positive(simulator: Simulator, *names: str) -> None:
     """Refuse parameters that are not finite numbers above zero."""
     for name in names:
         value = getattr(simulator, name)
-        if not (isinstance(value, Real) and 0 < value < np.inf):
+        if not (isinstance(value, int | float) and 0 < value < np.inf):
             raise ValueError(f"Expected {name} above 0, got {value!r}; set sim.{name}")
 
 
@@ -230,5 +229,5 @@ def require_not_negative(simulator: Simulator, *names: str) -> None:
     """Refuse parameters that are not finite numbers from zero up."""
     for name in names:
         value = getattr(simulator, name)
-        if not (isinstance(value, Real) and 0 <= value < np.inf):
+        if not (isinstance(value, int | float) and 0 <= value < np.inf):
             raise ValueError(f"Expected {name} of 0 or more, got {value!r}; set sim.{name}")
