@@ -48,6 +48,7 @@ class V2E(Simulator):
         ValueError: a threshold is not positive, the knee is below 1, or another value is negative.
 
     Example:
+        >>> import numpy as np
         >>> frames = np.array([np.full((1, 1), level) for level in (64.0, 128.0)])
         >>> ideal = V2E(threshold_sigma_log=0, cutoff_hz=0, leak_hz=0, shot_noise_hz=0)
         >>> ideal.simulate(frames, [0, 70_000]).t.tolist()

@@ -124,9 +124,9 @@ def test_metric_from_a_checkpoint(tmp_path):
         each.update(moving_edges(1), moving_edges(2))
     assert float(metric.compute()) == pytest.approx(float(direct.compute()), abs=1e-7)
     assert len(metric.weights_sha256) == 64
-    with pytest.raises(ValueError, match=r"size small, got tiny; set metric\.size"):
+    with pytest.raises(ValueError, match=r"size small, got tiny; set eqs\.size"):
         EventQualityScore(tmp_path / "judge.ckpt", partition_split_32=1)
-    with pytest.raises(ValueError, match=r"input channels 10, got 20; set metric\.bins"):
+    with pytest.raises(ValueError, match=r"input channels 10, got 20; set eqs\.bins"):
         EventQualityScore(tmp_path / "judge.ckpt", bins=5, **SETTINGS)
 
 
@@ -140,5 +140,5 @@ def test_random_weights_are_seeded_and_leave_the_global_seed_alone():
 
 
 def test_missing_checkpoint_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"gone\.ckpt, got no file; set metric\.weights"):
+    with pytest.raises(FileNotFoundError, match=r"gone\.ckpt, got no file; set eqs\.weights"):
         EventQualityScore(tmp_path / "gone.ckpt")
