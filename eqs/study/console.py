@@ -38,7 +38,8 @@ def _chosen(frame: pd.DataFrame, names: list[str]) -> Table:
 def _drawn(table: Table, title: str) -> ConsoleTable:
     drawn = ConsoleTable(title=title)
     for place, name in enumerate(table.header):
-        drawn.add_column(name, justify="right" if place else "left", overflow="fold")
+        heading = name.replace("_", " ")  # a heading breaks at spaces, a name nowhere
+        drawn.add_column(heading, justify="right" if place else "left", no_wrap=not place)
     for row in table.rows:
         drawn.add_row(*row)
     return drawn
