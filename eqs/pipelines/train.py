@@ -18,6 +18,7 @@ from rich.console import Console
 
 from eqs.data import EventSource, LabelProtocol, RecordedEvents
 from eqs.files import short_hash
+from eqs.models.checkpoint import check_resumable
 from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.prepare import prepare_data, prepare_stream
@@ -49,19 +50,21 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
     """Do the work of one run and record what it measured."""
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
     torch.set_num_threads(max(1, (os.cpu_count() or 1) // cfg.jobs))
-    data = prepare_data(cfg, times)
-    prepare_stream(source, data, times)
-    run.save_config(cfg)
     tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
     if isinstance(source, RecordedEvents):
         del tests["own"]  # on the recorded events both tests are the same one
     protocol = instantiate(cfg.protocol)
+    task = build_task(cfg, protocol, list(tests))
+    checkpoint = checkpoint_path(cfg, run)
+    if checkpoint is not None:
+        check_resumable(task.model, checkpoint)
+    data = prepare_data(cfg, times)
+    prepare_stream(source, data, times)
+    run.save_config(cfg)
     datamodule = instantiate(cfg.datamodule)(
         dataset=data, protocol=protocol, source=source, tests=tests
     )
-    task = build_task(cfg, protocol, list(tests))
     trainer = build_trainer(cfg, run)
-    checkpoint = checkpoint_path(cfg, run)
     with times.measure(f"train {source.name}", resumed=checkpoint is not None):
         start = time.perf_counter()
         trainer.fit(task, datamodule, ckpt_path=checkpoint)
