@@ -14,6 +14,7 @@ from eqs.models.backbone import RVTBackbone
 from eqs.models.checkpoint import load_weights, read_weights, shape_of
 from eqs.models.fpn import PAFPN
 from eqs.models.loss import detection_loss
+from eqs.models.lstm import ConvLSTM
 from eqs.models.states import States
 from eqs.models.yolox_head import YOLOXHead, decode_boxes
 
@@ -48,6 +49,7 @@ class RVTDetector(nn.Module):
             depend on it anew instead of failing.
         layer_scale_init: factor that every attention and MLP branch starts with; the published one
             is close to nothing, a larger one lets a short training use the branches at once.
+        open_recurrence: start every recurrent cell so that it passes its input on.
 
     Raises:
         ValueError: an unknown size, or weights that do not fit.
@@ -70,11 +72,15 @@ class RVTDetector(nn.Module):
         weights: str | Path | None = None,
         new_class_branch: bool = False,
         layer_scale_init: float = LAYER_SCALE_INIT,
+        open_recurrence: bool = False,
     ) -> None:
         """Build the network, then load `weights` if there are any."""
         super().__init__()
         if size not in SIZES:
-            raise ValueError(f"Expected one of {', '.join(SIZES)}, got {size!r}; set model.size")
+            raise ValueError(
+                f"Expected one of {', '.join(SIZES)}, got {size!r}; "
+                "set model.size, or eqs.size of a judge"
+            )
         if min(num_classes, in_channels, partition_split_32) < 1:
             raise ValueError(
                 "Expected positive num_classes, in_channels and partition_split_32, got "
@@ -92,6 +98,8 @@ class RVTDetector(nn.Module):
         for module in self.modules():
             if isinstance(module, LayerScale):
                 nn.init.constant_(module.gamma, layer_scale_init)
+            elif isinstance(module, ConvLSTM) and open_recurrence:
+                module.start_open()
         if weights is not None:
             load_weights(self, weights, new_class_branch=new_class_branch)
 

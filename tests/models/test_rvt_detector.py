@@ -98,6 +98,7 @@ def test_configurations_build_their_size(size):
     config = OmegaConf.load(CONFIGS / f"rvt_{size}.yaml")
     # These come from other groups of the whole configuration.
     config.num_classes, config.partition_split_32, config.layer_scale_init = 3, 2, 0.1
+    config.in_channels, config.open_recurrence = 20, True
     model = instantiate(config)
     assert (model.size, model.num_classes, model.backbone.multiple) == (size, 3, 64)
     gammas = [value for name, value in model.named_parameters() if name.endswith("gamma")]

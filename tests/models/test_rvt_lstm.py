@@ -78,3 +78,16 @@ def test_gates_explain_the_states(with_state):
     expected = forget.sigmoid() * before + enter.sigmoid() * candidate.tanh()
     torch.testing.assert_close(cells, expected)
     torch.testing.assert_close(hiddens, leave.sigmoid() * cells.tanh())
+
+
+def test_an_open_cell_passes_its_input_on_from_the_first_step():
+    torch.manual_seed(0)
+    cell, x = ConvLSTM(24), torch.randn(1, 1, 6, 8, 24)
+
+    def likeness() -> float:
+        hidden = cell(x, None)[0].detach()
+        return float(torch.corrcoef(torch.stack([hidden.flatten(), x.flatten()]))[0, 1])
+
+    assert likeness() < 0.3
+    cell.start_open()
+    assert likeness() > 0.9
