@@ -71,31 +71,34 @@ class Drive:
         )
 
 
-def _waves(rng: np.random.Generator, scale: float) -> NDArray[np.float64]:
-    # Amplitude and frequency range of slow and fast motion, for each of the six axes.
+def _waves(rng: np.random.Generator, *, sway: float, shake: float) -> NDArray[np.float64]:
+    """Slow and fast motion of the six axes, of these shares of a driving car's amplitudes."""
+    # Amplitude and range of frequencies in Hz of the slow, then of the fast motion.
     table = {
         "forward": ((0.5, 0.15, 0.4), (0.0, 1.0, 2.0)),
         "side": ((0.25, 0.15, 0.4), (0.01, 1.5, 3.0)),
-        "up": ((0.02, 1.0, 2.0), (0.006, 5.0, 9.0)),
-        "yaw": ((0.07, 0.12, 0.35), (0.005, 1.5, 4.0)),
-        "pitch": ((0.008, 1.0, 2.2), (0.0022, 6.0, 12.0)),
-        "roll": ((0.010, 0.6, 1.5), (0.002, 4.0, 8.0)),
+        "up": ((0.02, 1.0, 2.0), (0.012, 4.0, 8.0)),
+        "yaw": ((0.07, 0.12, 0.35), (0.014, 1.5, 4.0)),
+        "pitch": ((0.008, 1.0, 2.2), (0.008, 3.0, 7.0)),
+        "roll": ((0.010, 0.6, 1.5), (0.006, 2.0, 6.0)),
     }
 
     def wave(size: float, low: float, high: float) -> tuple[float, float, float]:
         rate, phase = 2.0 * np.pi * rng.uniform(low, high), rng.uniform(0.0, 2.0 * np.pi)
-        return scale * size * rng.uniform(0.5, 1.3), rate, phase
+        return size * rng.uniform(0.5, 1.3), rate, phase
 
-    return np.array([[wave(*part) for part in parts] for parts in table.values()])
+    waves = np.array([[wave(*part) for part in parts] for parts in table.values()])
+    waves[:, :, 0] *= (sway, shake)
+    return waves
 
 
 def draw_drive(rng: np.random.Generator, *, still: bool) -> Drive:
     """A drive along the right lane; a `still` one waits with the engine running."""
-    speed = 0.0 if still else rng.uniform(4.0, 11.0)
+    speed = 0.0 if still else rng.uniform(3.0, 8.0)
     return Drive(
         speed=speed,
         x=LANE_M + rng.uniform(-0.3, 0.3),
-        waves=_waves(rng, 0.12 if still else 1.0),
+        waves=_waves(rng, sway=0.12 if still else 1.0, shake=0.5 if still else 1.0),
         yaw=rng.uniform(-0.06, 0.06),
     )
 
@@ -182,9 +185,10 @@ def _truck(rng: np.random.Generator, *, lit: bool) -> NDArray[np.float64]:
 
 
 def _pedestrian(rng: np.random.Generator, *, gait: float) -> NDArray[np.float64]:
+    coat, trousers = rng.permutation([rng.uniform(0.03, 0.07), rng.uniform(0.45, 0.75)])
     return build.pedestrian(
-        _paint(rng, bright=0.7),
-        _paint(rng, bright=0.5),
+        coat,
+        trousers,
         height=rng.uniform(1.5, 1.92),
         gait=gait,
         phase=rng.uniform(0.0, 2.0 * np.pi),
@@ -209,7 +213,7 @@ def draw_furniture(rng: np.random.Generator, reach_m: float, *, night: bool) -> 
         side = 1.0 if k % 2 else -1.0
         parts = build.street_lamp(reach=-1.8 * side, lit=night)
         things.append(Actor(x=side * (KERB_M + 0.4), z=k * LAMP_SPACING_M, parts=parts))
-    share = rng.uniform(0.02, 0.1)
+    share = rng.uniform(0.01, 0.04)
     for z in np.arange(3.0, reach_m, 4.0):
         for side in (-1.0, 1.0):
             kind, x = rng.random() / share, side * (KERB_M + rng.uniform(0.4, 0.9))
@@ -233,8 +237,8 @@ def draw_vehicles(
     """Parked, leading and oncoming cars and trucks."""
     found = []
     for side, heading in ((1.0, 0.0), (-1.0, np.pi)):
-        share, z = rng.uniform(0.05, 0.35), rng.uniform(2.0, 10.0)
-        while z < way_m + 55.0:
+        share, z = rng.uniform(0.02, 0.2), rng.uniform(2.0, 10.0)
+        while z < way_m + 18.0:
             if rng.random() < share:
                 heavy = rng.random() < 0.08
                 parts = _truck(rng, lit=False) if heavy else _car(rng, lit=False)
@@ -242,17 +246,17 @@ def draw_vehicles(
                 label = TRUCK if heavy else CAR
                 found.append(Actor(x=x, z=z, heading=heading, label=label, parts=parts))
             z += 8.6 if rng.random() < share else 6.2
-    if rng.random() < 0.55:
-        heavy = rng.random() < 0.25
+    if rng.random() < 0.25:
+        heavy = rng.random() < 0.1
         parts = _truck(rng, lit=night) if heavy else _car(rng, lit=night)
-        speed = max(0.0, drive.speed + rng.uniform(-1.5, 2.5))
+        speed = max(0.0, drive.speed + rng.choice([-1.0, 1.0]) * rng.uniform(1.0, 2.5))
         label = TRUCK if heavy else CAR
         found.append(
-            Actor(x=drive.x, z=rng.uniform(13.0, 32.0), speed=speed, label=label, parts=parts)
+            Actor(x=drive.x, z=rng.uniform(9.0, 24.0), speed=speed, label=label, parts=parts)
         )
-    z = rng.uniform(12.0, 40.0)
-    for _ in range(rng.integers(1, 4)):
-        heavy = rng.random() < 0.2
+    z = rng.uniform(12.0, 34.0)
+    for _ in range(rng.integers(0, 3)):
+        heavy = rng.random() < 0.12
         parts = _truck(rng, lit=night) if heavy else _car(rng, lit=night)
         x, label = -LANE_M + rng.uniform(-0.2, 0.2), TRUCK if heavy else CAR
         found.append(Actor(x=x, z=z, speed=8.0, heading=np.pi, label=label, parts=parts))
@@ -265,32 +269,33 @@ def draw_people(
 ) -> list[Actor]:
     """Pedestrians on the pavements and crossing, and cyclists."""
     found = []
-    for _ in range(rng.integers(3, 8)):
+    for _ in range(rng.integers(1, 4)):
         walking = rng.random() < 0.8
         speed = rng.uniform(1.0, 1.8) if walking else 0.0
         heading = float(rng.choice([0.0, np.pi])) + rng.uniform(-0.1, 0.1)
         beside = rng.random() < 0.4  # on the road beside the parked cars
         x = rng.uniform(3.6, 4.2) if beside else rng.uniform(KERB_M + 0.3, HALF_STREET_M - 0.8)
         x *= rng.choice([-1.0, 1.0])
-        z = rng.uniform(6.0, way_m + 22.0)
+        z = rng.uniform(5.0, way_m + 8.0)
         parts = _pedestrian(rng, gait=speed * 4.6)
         found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=PEDESTRIAN, parts=parts))
-    for _ in range(rng.integers(1, 4)):
+    for _ in range(rng.integers(0, 3)):
         side, speed = rng.choice([-1.0, 1.0]), rng.uniform(1.0, 1.9)
-        x, z = side * rng.uniform(1.0, KERB_M), way_m + rng.uniform(5.0, 18.0)
+        x, z = side * rng.uniform(1.0, KERB_M), way_m + rng.uniform(4.0, 10.0)
         parts = _pedestrian(rng, gait=speed * 4.6)
         found.append(
             Actor(x=x, z=z, speed=speed, heading=-side * np.pi / 2, label=PEDESTRIAN, parts=parts)
         )
-    for _ in range(rng.integers(2, 5)):
+    for _ in range(rng.integers(1, 4)):
         speed, kind = rng.uniform(3.0, 6.5), rng.random()
         parts = _cyclist(rng, lit=night)
-        if kind < 0.45:
-            x, z, heading = rng.uniform(3.1, 3.9), rng.uniform(7.0, 0.7 * way_m + 16.0), 0.0
-        elif kind < 0.65:
-            x, z, heading = -rng.uniform(2.4, 3.4), rng.uniform(12.0, way_m + 28.0), np.pi
+        if kind < 0.25:
+            x, z, heading = rng.uniform(3.1, 3.9), rng.uniform(5.0, 0.7 * way_m + 7.0), 0.0
+        elif kind < 0.4:
+            x, z, heading = -rng.uniform(2.4, 3.4), rng.uniform(10.0, way_m + 20.0), np.pi
         else:
             heading = float(rng.choice([-1.0, 1.0])) * np.pi / 2
-            x, z = -np.sign(heading) * rng.uniform(3.0, 9.0), way_m + rng.uniform(7.0, 20.0)
+            x = -np.sign(heading) * rng.uniform(2.0, 12.0)
+            z = way_m * rng.uniform(0.3, 1.0) + rng.uniform(5.0, 10.0)
         found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=RIDER, parts=parts))
     return found

@@ -24,7 +24,7 @@ from eqs.scenes.optics import (
 from eqs.scenes.outline import Polygons, outline_actors
 from eqs.scenes.render import COLUMN_FACTS, measure_actors, paint_actors, paint_street
 
-FIELD_OF_VIEW_RAD = np.deg2rad(60.0)
+FIELD_OF_VIEW_RAD = np.deg2rad(44.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ class DrivingWorld:
 
     Args:
         height: rows of the image.
-        width: columns of the image; the horizontal field of view is 60 degrees.
+        width: columns of the image; the horizontal field of view is 44 degrees.
         seed: integers that name this world.
         night: street lamps, lit windows and headlights instead of daylight.
         still: the camera waits instead of driving.
