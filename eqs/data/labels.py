@@ -1,4 +1,4 @@
-"""Which labelled boxes count: classes, field of view and smallest size, named and stored."""
+"""What a mAP counts: classes, field of view, smallest size and score, named and stored."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, kw_only=True)
 class LabelProtocol:
-    """The population of boxes that training and evaluation share.
+    """The population of boxes that training and evaluation share, and how detections enter.
 
     Numbers measured with different protocols cannot be compared, so `card()` is stored beside
     every number.
@@ -30,7 +30,11 @@ class LabelProtocol:
         reference_width: sensor width for which the sizes are meant; other sensors scale them.
             None takes them as they are.
         crop_rows: number of rows, counted from the top, that are used; all of them if None.
-        score_empty_frames: whether a frame without a box counts, as one that shows no object.
+        score_empty_frames: whether a frame without a box counts, as one that shows no object; if
+            not, it drops out together with its detections.
+        filter_detections: whether detections below the size limits drop out as labels do.
+        class_score: whether detections are ranked by their class confidence alone, instead of its
+            product with the objectness.
 
     Raises:
         ValueError: there is no class, an id belongs to two classes, or a size is negative.
@@ -51,6 +55,8 @@ class LabelProtocol:
     reference_width: int | None = None
     crop_rows: int | None = None
     score_empty_frames: bool = True
+    filter_detections: bool = False
+    class_score: bool = False
 
     def __post_init__(self) -> None:
         """Check the classes and sizes, and keep plain copies of configured containers."""
@@ -99,12 +105,16 @@ class LabelProtocol:
         )
         boxes = np.stack([left, top, right, bottom], axis=1)
         boxes = clip_boxes(boxes, self.rows(height), width)
+        keep = (labels >= 0) & np.all(boxes[:, 2:] > boxes[:, :2], axis=1)
+        keep &= self.large_enough(boxes, width)
+        return boxes[keep], labels[keep]
+
+    def large_enough(self, boxes: NDArray[np.float32], width: int) -> NDArray[np.bool_]:
+        """Which boxes x1 y1 x2 y2, shape (n, 4), reach the size limits on a sensor this wide."""
         sides = boxes[:, 2:] - boxes[:, :2]
         scale = 1.0 if self.reference_width is None else width / self.reference_width
-        keep = (labels >= 0) & np.all(sides > 0, axis=1)
-        keep &= np.all(sides >= self.min_side_px * scale, axis=1)
-        keep &= np.hypot(*sides.T) >= self.min_diagonal_px * scale
-        return boxes[keep], labels[keep]
+        large = np.all(sides >= self.min_side_px * scale, axis=1)
+        return large & (np.hypot(*sides.T) >= self.min_diagonal_px * scale)
 
     def card(self) -> dict[str, Any]:
         """Everything that decides which boxes count, for storing beside a number."""
@@ -116,6 +126,8 @@ class LabelProtocol:
             "reference_width": self.reference_width,
             "crop_rows": self.crop_rows,
             "score_empty_frames": self.score_empty_frames,
+            "filter_detections": self.filter_detections,
+            "class_score": self.class_score,
         }
 
     @cached_property

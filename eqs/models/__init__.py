@@ -3,12 +3,13 @@
 from eqs.models.backbone import TAPS, RVTBackbone
 from eqs.models.detector import SIZES, RVTDetector
 from eqs.models.loss import detection_loss
-from eqs.models.postprocess import postprocess
+from eqs.models.postprocess import Detections, postprocess
 from eqs.models.states import States, detach_states, gather_frames, reset_states
 
 __all__ = [
     "SIZES",
     "TAPS",
+    "Detections",
     "RVTBackbone",
     "RVTDetector",
     "States",

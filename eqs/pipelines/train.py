@@ -38,8 +38,6 @@ def train(cfg: DictConfig) -> dict[str, Any]:
     if run.finished and not cfg.overwrite:
         log.info("%s is finished already; overwrite=true trains it again", run.folder)
     else:
-        if cfg.overwrite:
-            shutil.rmtree(run.folder, ignore_errors=True)
         execute(cfg, run, source, phase_times(cfg))
     result = run.result()
     show(result)
@@ -60,6 +58,8 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
         check_resumable(task.model, checkpoint)
     data = prepare_data(cfg, times)
     prepare_stream(source, data, times)
+    if cfg.overwrite:  # only now: everything that can be refused was looked at
+        shutil.rmtree(run.folder, ignore_errors=True)
     run.save_config(cfg)
     datamodule = instantiate(cfg.datamodule)(
         dataset=data, protocol=protocol, source=source, tests=tests
@@ -77,9 +77,7 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
 def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]) -> DetectionTask:
     """The configured detector in its training module."""
     model = instantiate(cfg.model)
-    return instantiate(cfg.task)(
-        model=model, class_names=protocol.class_names, test_streams=test_streams
-    )
+    return instantiate(cfg.task)(model=model, protocol=protocol, test_streams=test_streams)
 
 
 def build_trainer(cfg: DictConfig, run: Run) -> lightning.Trainer:
@@ -99,7 +97,7 @@ def checkpoint_path(cfg: DictConfig, run: Run) -> Path | None:
     if cfg.ckpt_path is None:
         return None
     if cfg.ckpt_path == "last":
-        return run.last_checkpoint if run.last_checkpoint.exists() else None
+        return run.last_checkpoint if run.last_checkpoint.exists() and not cfg.overwrite else None
     path = Path(cfg.ckpt_path)
     if not path.is_file():
         raise FileNotFoundError(f"Expected a checkpoint at {path}, found none; set ckpt_path")

@@ -12,8 +12,10 @@ from torch import Tensor, nn
 from torch.optim import Optimizer
 from torch.optim.lr_scheduler import LRScheduler
 
+from eqs.data import LabelProtocol
 from eqs.metrics import MeanAveragePrecision
 from eqs.models import (
+    Detections,
     RVTDetector,
     States,
     detach_states,
@@ -35,11 +37,10 @@ class DetectionTask(lightning.LightningModule):
         model: the detector.
         optimizer: builds the optimizer from the parameters.
         scheduler: builds the schedule, stepped once per batch, from the optimizer.
-        class_names: names of the classes, in label order.
+        protocol: the classes, and which detections enter a mAP with which score.
         test_streams: name of each test dataloader's event stream.
         confidence_threshold: objectness times class probability below which a box is dropped.
         nms_threshold: overlap above which the weaker of two boxes of a class is dropped.
-        drop_empty_frames: leave frames without ground truth out of the mAP.
     """
 
     def __init__(
@@ -47,12 +48,10 @@ class DetectionTask(lightning.LightningModule):
         model: RVTDetector,
         optimizer: Callable[[Iterable[nn.Parameter]], Optimizer],
         scheduler: Callable[[Optimizer], LRScheduler],
-        class_names: Sequence[str],
+        protocol: LabelProtocol,
         test_streams: Sequence[str] = (),
         confidence_threshold: float = 0.001,
         nms_threshold: float = 0.45,
-        *,
-        drop_empty_frames: bool = False,
     ) -> None:
         """Keep the parts and prepare one mAP for each stream."""
         super().__init__()
@@ -60,16 +59,11 @@ class DetectionTask(lightning.LightningModule):
         self.make_optimizer = optimizer
         self.make_scheduler = scheduler
         self.thresholds = (confidence_threshold, nms_threshold)
-        self.class_names = list(class_names)
+        self.protocol = protocol
         self.test_streams = list(test_streams)
-
-        def precision_metric() -> MeanAveragePrecision:
-            return MeanAveragePrecision(
-                num_classes=len(class_names), drop_empty_frames=drop_empty_frames
-            )
-
-        self.val_precision = precision_metric()
-        self.test_precision = [precision_metric() for _ in self.test_streams]
+        classes = len(protocol.class_names)
+        self.val_precision = MeanAveragePrecision(num_classes=classes)
+        self.test_precision = [MeanAveragePrecision(num_classes=classes) for _ in test_streams]
         self.test_metrics = nn.ModuleList(self.test_precision)  # so that they move with the task
         self._train_states: States | None = None
         self._evaluation_states: States | None = None
@@ -102,7 +96,7 @@ class DetectionTask(lightning.LightningModule):
         for stream, metric in zip(self.test_streams, self.test_precision, strict=True):
             self._log_precision(f"test/{stream}", metric)
 
-    def detect(self, batch: Batch) -> list[dict[str, Tensor]]:
+    def detect(self, batch: Batch) -> list[Detections]:
         """Detections of each labelled frame of a chunk, with states carried from the last call.
 
         Returns:
@@ -115,9 +109,14 @@ class DetectionTask(lightning.LightningModule):
         labelled = batch["labelled"]
         if not labelled.any():
             return []
-        predictions = self.model.detect(gather_frames(maps, labelled))
-        confidence, overlap = self.thresholds
-        return postprocess(predictions.float(), confidence, overlap)
+        predictions = self.model.detect(gather_frames(maps, labelled)).float()
+        protocol, (confidence, overlap) = self.protocol, self.thresholds
+        found = postprocess(predictions, confidence, overlap, class_score=protocol.class_score)
+        if protocol.filter_detections:
+            found = [
+                large_detections(each, protocol, batch["histograms"].shape[-1]) for each in found
+            ]
+        return found
 
     def _evaluate(self, batch: Batch, metric: MeanAveragePrecision) -> None:
         detections = self.detect(batch)
@@ -133,14 +132,24 @@ class DetectionTask(lightning.LightningModule):
             key: value for key, value in values.items() if key.startswith("map") and not value.ndim
         }
         for key in ("map_per_class", "map_50_per_class", "ground_truths_per_class"):
-            pairs = zip(self.class_names, values[key], strict=True)
+            pairs = zip(self.protocol.class_names, values[key], strict=True)
             scalars |= {f"{key}/{name}": value.float() for name, value in pairs}
         self.log_dict({f"{prefix}/{key}": value for key, value in scalars.items()})
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
-        """Optimizer with a schedule that moves once per batch."""
-        optimizer = self.make_optimizer(self.model.parameters())
-        scheduler = self.make_scheduler(optimizer)
+        """Optimizer with a schedule that moves once per batch.
+
+        Raises:
+            ValueError: one of their settings is of the wrong kind or out of range.
+        """
+        try:
+            optimizer = self.make_optimizer(self.model.parameters())
+            scheduler = self.make_scheduler(optimizer)
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                f"Expected settings that optimizer and schedule take, got: {error}; set "
+                "recipe.learning_rate, or what is wrong below task.optimizer and task.scheduler"
+            ) from error
         return {
             "optimizer": optimizer,
             "lr_scheduler": {"scheduler": scheduler, "interval": "step"},
@@ -161,6 +170,13 @@ def ground_truth(rows: Tensor) -> dict[str, Tensor]:
     rows = rows[rows[:, 3] > 0].float()
     centre, half = rows[:, 1:3], rows[:, 3:5] / 2
     return {"boxes": torch.cat([centre - half, centre + half], dim=1), "labels": rows[:, 0].long()}
+
+
+def large_detections(found: Detections, protocol: LabelProtocol, width: int) -> Detections:
+    """The detections of one frame that reach the protocol's size limits."""
+    large = protocol.large_enough(found["boxes"].cpu().numpy(), width)
+    kept = torch.from_numpy(large).to(found["boxes"].device)
+    return {name: values[kept] for name, values in found.items()}
 
 
 def move_states(states: States, device: torch.device) -> States:

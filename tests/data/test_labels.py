@@ -81,7 +81,9 @@ def test_bad_protocols():
         protocol(min_side_px=-1)
 
 
-@pytest.mark.parametrize(("name", "count"), [("coco", 3), ("dsec8", 8)])
+@pytest.mark.parametrize(
+    ("name", "count"), [("coco", 3), ("dsec8", 8), ("dagr", 2), ("prophesee_gen1", 2)]
+)
 def test_configured_protocols(name, count):
     path = Path(__file__).parents[2] / "configs" / "protocol" / f"{name}.yaml"
     config = yaml.safe_load(path.read_text())

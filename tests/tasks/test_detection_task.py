@@ -1,5 +1,6 @@
 """One step of training and evaluation, on a tiny detector and made-up windows."""
 
+from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -7,6 +8,7 @@ import torch
 from torch.optim import SGD
 from torch.optim.lr_scheduler import ConstantLR
 
+from eqs.data import LabelProtocol
 from eqs.models import RVTDetector
 from eqs.tasks import DetectionTask
 from eqs.tasks.detection import ground_truth
@@ -20,8 +22,9 @@ def task(monkeypatch: pytest.MonkeyPatch) -> DetectionTask:
         monkeypatch.setattr(DetectionTask, name, lambda *_, **__: None)
     torch.manual_seed(0)
     model = RVTDetector("tiny", num_classes=2, in_channels=4, partition_split_32=1)
+    protocol = LabelProtocol(name="two", classes={"car": [2], "pedestrian": [0]})
     return DetectionTask(
-        model, partial(SGD, lr=0.1), partial(ConstantLR), ["car", "pedestrian"], ["own", "real"]
+        model, partial(SGD, lr=0.1), partial(ConstantLR), protocol, ["own", "real"]
     )
 
 
@@ -107,3 +110,17 @@ def test_ground_truth_turns_rows_into_corners_and_drops_padding() -> None:
     truth = ground_truth(rows)
     assert truth["boxes"].tolist() == [[8.0, 17.0, 12.0, 23.0]]
     assert truth["labels"].tolist() == [1]
+
+
+def test_detections_below_the_size_limits_drop_out_when_asked(task: DetectionTask) -> None:
+    task.eval()
+    task.thresholds = (0.0, 1.0)
+    with torch.no_grad():
+        everything = task.detect(batch())[0]
+        task._evaluation_states = None
+        task.protocol = replace(task.protocol, min_side_px=9.0, filter_detections=True)
+        large = task.detect(batch())[0]
+    sides = everything["boxes"][:, 2:] - everything["boxes"][:, :2]
+    keep = (sides >= 9.0).all(1)
+    assert 0 < keep.sum() < len(keep)
+    torch.testing.assert_close(large["boxes"], everything["boxes"][keep])
