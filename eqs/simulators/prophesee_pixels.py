@@ -1,0 +1,135 @@
+"""The pixels of Prophesee's simulator in continuous time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from eqs.frames import GreyImage
+from eqs.simulators.base import Interval
+from eqs.simulators.crossing import fire_levels, firing_pixels
+from eqs.simulators.noise import scatter_noise, shot_events
+from eqs.simulators.ordering import Fired, with_room
+from eqs.simulators.photoreceptor import MICROSECONDS, filter_share
+from eqs.simulators.randomness import draw_key, uniform_map
+from eqs.simulators.thresholds import threshold_map
+
+if TYPE_CHECKING:
+    from eqs.simulators.prophesee import Prophesee
+
+LARGEST_THRESHOLD_LOG = 1.0
+
+
+class PropheseePixels:
+    """Filters and mismatch of all pixels, and how far each is above its memory."""
+
+    def __init__(self, model: Prophesee, image: GreyImage, sequence: str) -> None:
+        """Settle on the first image."""
+        self.model = model
+        self.sequence = sequence
+        self.first_filter = model.signal(image.levels)[image.codes]
+        self.second_filter = self.first_filter.copy()
+        self.on: NDArray[Any] = self._thresholds(model.threshold_on_log, "threshold on")
+        self.off: NDArray[Any] = self._thresholds(model.threshold_off_log, "threshold off")
+        self.last_us = np.full(image.codes.size, -np.inf)
+        self.keys = np.empty(image.codes.size, np.int64)
+        self._begin()
+
+    def _thresholds(self, mean_log: float, name: str) -> NDArray[np.float64]:
+        model, pixels = self.model, self.first_filter.size
+        drawn = threshold_map(mean_log, model.threshold_sigma_log, model.seed, name, pixels)
+        return np.minimum(drawn, LARGEST_THRESHOLD_LOG) if model.threshold_sigma_log else drawn
+
+    def _begin(self) -> None:
+        """Place each pixel somewhere on its way to a leak event."""
+        pixels = self.on.size
+        self.above, self.moved = np.zeros(pixels), np.zeros(pixels)
+        self.chosen = np.empty(pixels + 1, np.int32)
+        self.passed = np.empty(pixels + 1, np.int64)
+        if self.model.leak_hz > 0:
+            key = draw_key(self.model.seed, "leak phase", self.sequence)
+            self.above = self.on * uniform_map(key, pixels)
+
+    def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
+        """Events of one interval."""
+        share = filter_share(image.levels, self.model.cutoff_hz, interval.span_us)
+        shot = shot_events(image.levels, self.model.shot_noise_hz, interval.span_us)
+        self.keys, count = self._fire(image, share, shot, interval)
+        return self.keys[:count]
+
+    def _fire(
+        self,
+        image: GreyImage,
+        share: NDArray[np.float64],
+        shot: NDArray[np.float64],
+        interval: Interval,
+    ) -> Fired:
+        model = self.model
+        _move(
+            image.codes,
+            model.signal(image.levels),
+            share,
+            self.first_filter,
+            self.second_filter,
+            self.above,
+            self.moved,
+            self.on,
+            model.leak_hz * interval.span_us * MICROSECONDS,
+        )
+        chosen, total = firing_pixels(self.moved, self.on, self.off, self.chosen, self.passed)
+        keys = with_room(self.keys, total)
+        count = fire_levels(
+            self.chosen[:chosen],
+            self.passed,
+            self.above,
+            self.moved,
+            self.last_us,
+            self.on,
+            self.off,
+            float(model.refractory_us),
+            False,
+            interval.start_us,
+            interval.span_us,
+            keys,
+        )
+        self.above, self.moved = self.moved, self.above
+        if model.shot_noise_hz == 0:
+            return keys, count
+        return scatter_noise(
+            image.codes,
+            shot,
+            self.above,
+            self.on,
+            self.off,
+            (model.threshold_on_log, model.threshold_off_log),
+            draw_key(model.seed, "shot noise", self.sequence, str(interval.frame)),
+            interval.start_us,
+            interval.span_us,
+            keys,
+            count,
+        )
+
+
+@njit(cache=True, nogil=True)
+def _move(
+    codes: NDArray[Any],
+    signal: NDArray[np.float64],
+    share: NDArray[np.float64],
+    first_filter: NDArray[np.float64],
+    second_filter: NDArray[np.float64],
+    above: NDArray[np.float64],
+    moved: NDArray[np.float64],
+    on: NDArray[np.float64],
+    leaks: float,
+) -> None:
+    """Filter and leak: how far each pixel is above its memory when the interval ends."""
+    for pixel in range(codes.size):
+        weight, before = share[codes[pixel]], second_filter[pixel]
+        first = (1.0 - weight) * first_filter[pixel] + weight * signal[codes[pixel]]
+        after = (1.0 - weight) * before + weight * first
+        first_filter[pixel] = first
+        second_filter[pixel] = after
+        moved[pixel] = above[pixel] + (after - before) + leaks * on[pixel]
