@@ -14,7 +14,7 @@ from typing import Protocol
 from rich.progress import track
 
 from eqs.data.recording import Recording
-from eqs.events.store import EventWriter
+from eqs.events.writer import EventWriter
 from eqs.files import file_sha256, read_json, short_hash, write_json
 from eqs.frames import FrameFolder
 from eqs.simulators import Simulator

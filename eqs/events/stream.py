@@ -146,14 +146,14 @@ class Events:
     @classmethod
     def load(cls, path: Path | str, height: int | None = None, width: int | None = None) -> Events:
         """Read a whole DSEC HDF5 file; the sensor size is needed where the file lacks it."""
-        from eqs.events.store import EventReader
+        from eqs.events.reader import EventReader
 
         with EventReader(path, height=height, width=width) as reader:
             return reader.read()
 
     def save(self, path: Path | str) -> None:
         """Write a DSEC HDF5 file; it appears under its name only when it is complete."""
-        from eqs.events.store import EventWriter
+        from eqs.events.writer import EventWriter
 
         with EventWriter(path, height=self.height, width=self.width) as writer:
             writer.append(self)

@@ -15,14 +15,14 @@ import numpy as np
 from PIL import Image
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from eqs.events.store import EventWriter
+from eqs.events.writer import EventWriter
 from eqs.files import read_json, write_json
 from eqs.scenes.camera import FrameCamera
 from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.world import DrivingWorld
 
-VERSION: Final = 6  # raise it whenever the same parameters give other files
+VERSION: Final = 9  # raise it whenever the same parameters give other files
 FRAME_PERIOD_US: Final = 50_000
 LEAD_IN_US: Final = 60_000  # events before the first frame
 LEAD_OUT_US: Final = 10_000  # and after the last one
@@ -197,7 +197,7 @@ class DSECMini:
 
     size: str = "128x96"
     sequences: Mapping[str, int] = field(
-        default_factory=lambda: {"train": 40, "val": 5, "test": 10}
+        default_factory=lambda: {"train": 48, "val": 4, "test": 10}
     )
     frames: int = 60
     seed: int = 0
@@ -208,9 +208,7 @@ class DSECMini:
         """Refuse what cannot be generated."""
         width, separator, height = self.size.partition("x")
         if not (separator and width.isdigit() and height.isdigit() and int(width) * int(height)):
-            raise ValueError(
-                f"Expected a size like 128x96, got {self.size!r}; set data.generator.size"
-            )
+            raise ValueError(f"Expected a size like 128x96, got {self.size!r}; set data.size")
         unknown = set(self.sequences) - set(SPLITS)
         if unknown or any(count < 0 for count in self.sequences.values()):
             raise ValueError(

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from eqs.events.store import EventReader
+from eqs.events import EventReader
 from eqs.scenes import DSECMini, Recording
 
 TINY = DSECMini(size="32x24", sequences={"train": 2, "test": 1}, frames=4, workers=1)
