@@ -72,8 +72,7 @@ def stacked_histogram(
             firsts = _window_bins(events.t, bins, start, stop)
         else:
             firsts = _event_bins(events.t, bins)
-        count = _count_wrapping if wrap else _count_saturating
-        count(histogram, firsts, events.x, events.y, events.p, np.uint8(cutoff))
+        _count(histogram, firsts, events.x, events.y, events.p, np.uint8(cutoff), wrap)
     if wrap:
         np.minimum(histogram, cutoff, out=histogram)
     return histogram.reshape(2 * bins, events.height, events.width)
@@ -106,31 +105,20 @@ def _event_bins(t: NDArray[np.int64], bins: int) -> NDArray[np.int64]:
 
 
 @numba.njit(cache=True)
-def _count_saturating(
+def _count(
     histogram: NDArray[np.uint8],
     firsts: NDArray[np.int64],
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
     p: NDArray[np.uint8],
     cutoff: np.uint8,
+    wrap: bool,
 ) -> None:
-    """Add one per event, stopping at the cutoff; one bin after the other keeps the cache warm."""
+    """Add one per event, stopping at the cutoff, or modulo 256.
+
+    One bin after the other keeps the cache warm.
+    """
     for number in range(len(firsts) - 1):
         for i in range(firsts[number], firsts[number + 1]):
             count = histogram[p[i], number, y[i], x[i]]
-            histogram[p[i], number, y[i], x[i]] = count + (count < cutoff)
-
-
-@numba.njit(cache=True)
-def _count_wrapping(
-    histogram: NDArray[np.uint8],
-    firsts: NDArray[np.int64],
-    x: NDArray[np.uint16],
-    y: NDArray[np.uint16],
-    p: NDArray[np.uint8],
-    cutoff: np.uint8,
-) -> None:
-    """Add one per event, modulo 256."""
-    for number in range(len(firsts) - 1):
-        for i in range(firsts[number], firsts[number + 1]):
-            histogram[p[i], number, y[i], x[i]] += np.uint8(1)
+            histogram[p[i], number, y[i], x[i]] = count + (wrap or count < cutoff)
