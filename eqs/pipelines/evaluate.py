@@ -95,9 +95,9 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     data = dataset(cfg)
     recordings = data.recordings("test")
     systems = scored_systems(cfg, runs)
+    judge = find_judge(cfg, data)  # first: without one, simulating would be in vain
     for source in systems.values():
         source.prepare(recordings)
-    judge = find_judge(cfg, data)
     with times.measure("score"):
         scores = score_recordings(judge, recordings, systems, data.crop_rows)
     rows = [{"simulator": systems[row["system"]].name, **row} for row in scores.rows]

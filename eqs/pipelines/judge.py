@@ -22,7 +22,7 @@ from eqs.metrics import (
     load_backbone,
 )
 from eqs.pipelines.build import Dataset
-from eqs.pipelines.runs import Run, finished_runs
+from eqs.pipelines.runs import Run, finished_runs, recipe_hash
 
 log = logging.getLogger(__name__)
 EMBEDDED_DATA = "dsec_mini"
@@ -54,8 +54,10 @@ class Judge:
         return self.readings[0]
 
 
-def find_judge(cfg: DictConfig, data: Dataset) -> Judge:
-    """The configured judge, or the detector trained on the real stream of this data.
+def find_judge(cfg: DictConfig, data: Dataset | None) -> Judge:
+    """The configured judge, or a detector trained on the real stream of this data.
+
+    Of several the one that followed the configured recipe is taken, else the newest.
 
     Raises:
         ValueError: no weights are given and no detector was trained on a real stream.
@@ -63,9 +65,12 @@ def find_judge(cfg: DictConfig, data: Dataset) -> Judge:
     if cfg.eqs.weights is not None:
         return _given_judge(cfg, data)
     for name in dict.fromkeys([cfg.data.name, EMBEDDED_DATA]):
-        for run in finished_runs(Path(cfg.paths.runs) / name):
-            if run.result()["simulator"] == "real":
-                return _trained_judge(cfg, run)
+        found = finished_runs(Path(cfg.paths.runs) / name)
+        trained = [run for run in found if run.result()["simulator"] == "real"]
+        if trained:
+            recipe = recipe_hash(cfg)
+            ranks = {(run.result()["recipe"] == recipe, run.finished_ns): run for run in trained}
+            return _trained_judge(cfg, ranks[max(ranks)])
     raise ValueError(
         "Expected a judge trained on real events, got none: type `python train.py sim=real` first, "
         "or set eqs.weights to a checkpoint"
@@ -104,7 +109,7 @@ def _trained_judge(cfg: DictConfig, run: Run) -> Judge:
     )
 
 
-def _given_judge(cfg: DictConfig, data: Dataset) -> Judge:
+def _given_judge(cfg: DictConfig, data: Dataset | None) -> Judge:
     definition = _definition(cfg, cfg.eqs.size, cfg.eqs.partition_split_32)
     backbone, digest = load_backbone(
         cfg.eqs.weights,
@@ -123,8 +128,7 @@ def _given_judge(cfg: DictConfig, data: Dataset) -> Judge:
         )
     else:
         log.warning(
-            "%s has no training recordings to centre on: only raw scores are reported",
-            cfg.data.name,
+            "There are no real training recordings to centre on: only raw scores are reported",
         )
     return Judge(
         backbone=backbone,

@@ -16,6 +16,7 @@ from eqs.files import read_json, short_hash, write_json
 RECIPE_KEYS = ("data", "protocol", "model", "recipe", "datamodule", "task")
 # ... and nothing that only says where files lie or how many processes read them.
 INCIDENTAL = {"data": {"root", "workers"}, "datamodule": {"seed", "num_workers"}}
+RESULT_KEYS = {"simulator", "system", "seed", "recipe", "own", "real", "protocol"}
 
 
 def recipe_hash(cfg: DictConfig) -> str:
@@ -63,9 +64,25 @@ class Run:
         """Whether training and testing are complete."""
         return (self.folder / "result.json").exists()
 
+    @property
+    def finished_ns(self) -> int:
+        """When it was finished, nanoseconds since 1970."""
+        return (self.folder / "result.json").stat().st_mtime_ns
+
     def result(self) -> dict[str, Any]:
-        """What the finished run measured."""
-        return read_json(self.folder / "result.json")
+        """What the finished run measured.
+
+        Raises:
+            ValueError: the record lacks something, as those of older versions may.
+        """
+        result = read_json(self.folder / "result.json")
+        missing = RESULT_KEYS - result.keys()
+        if missing:
+            raise ValueError(
+                f"Expected {', '.join(sorted(missing))} in {self.folder / 'result.json'}, got "
+                "none; delete the folder, which train.py makes anew, or set paths.runs"
+            )
+        return result
 
     def finish(self, result: dict[str, Any]) -> None:
         """Mark the run as finished."""

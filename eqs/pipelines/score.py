@@ -65,7 +65,10 @@ def score_recordings(
             real = opened(recording, recording.events_path)
             streams = {name: opened(recording, s.path(recording)) for name, s in systems.items()}
             unrelated = opened(other, other.events_path) if other is not recording else None
-            score_recording(judge, recording, real, streams, unrelated, scores)
+            try:
+                score_recording(judge, recording, real, streams, unrelated, scores)
+            except ValueError as error:
+                raise ValueError(f"{recording.name}: {error}") from error
     return scores
 
 

@@ -93,7 +93,9 @@ class PIX2NVS(Simulator):
                 f"{self.reference_update!r}; set sim.reference_update"
             )
         if self.max_events < 1:
-            raise ValueError(f"Expected max_events of 1 or more, got {self.max_events}")
+            raise ValueError(
+                f"Expected max_events of 1 or more, got {self.max_events}; set sim.max_events"
+            )
         if self.block not in BLOCKS:
             raise ValueError(f"Expected block 1, 2 or 4, got {self.block}; set sim.block")
 

@@ -1,0 +1,54 @@
+"""Which detector judges, where several could."""
+
+import os
+from pathlib import Path
+
+import pytest
+from hydra import compose, initialize_config_dir
+
+from eqs.files import write_json
+from eqs.pipelines import judge
+from eqs.pipelines.runs import Run, recipe_hash
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+ACCURACY = {"own": {}, "real": {}, "protocol": {}}
+
+
+@pytest.fixture
+def cfg(tmp_path):
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        return compose("evaluate", [f"paths.runs={tmp_path}"])
+
+
+def finished(root, name, *, simulator="real", recipe="old", age_s=0):
+    folder = root / "dsec_mini" / simulator / name
+    folder.mkdir(parents=True)
+    result = {"simulator": simulator, "system": simulator, "seed": 0, "recipe": recipe, **ACCURACY}
+    write_json(folder / "result.json", result)
+    os.utime(folder / "result.json", (1e9 - age_s, 1e9 - age_s))
+    return Run(folder)
+
+
+@pytest.fixture
+def chosen(cfg, monkeypatch):
+    monkeypatch.setattr(judge, "_trained_judge", lambda _, run: run)
+    return lambda: judge.find_judge(cfg, None)
+
+
+def test_the_configured_recipe_wins_over_a_newer_one(cfg, chosen, tmp_path):
+    wanted = finished(tmp_path, "a", recipe=recipe_hash(cfg), age_s=100)
+    finished(tmp_path, "b")
+    assert chosen() == wanted
+
+
+def test_else_the_newest_wins(chosen, tmp_path):
+    finished(tmp_path, "a", age_s=100)
+    wanted = finished(tmp_path, "b")
+    finished(tmp_path, "c", age_s=50)
+    assert chosen() == wanted
+
+
+def test_detectors_of_simulated_streams_do_not_judge(chosen, tmp_path):
+    finished(tmp_path, "a", simulator="esim")
+    with pytest.raises(ValueError, match="Expected a judge trained on real events, got none"):
+        chosen()
