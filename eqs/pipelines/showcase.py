@@ -18,6 +18,7 @@ from eqs.study import Boxes
 # Long enough for motion to show, short enough for a sharp picture.
 WINDOW_US = 50_000
 RATE_SPAN_US = 1_500_000
+WELCOME_BOXES = 4  # in a picture that shows what detectors find
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,18 +57,28 @@ class Showcase:
 
 
 def choose(recordings: Sequence[Recording], protocol: LabelProtocol) -> Showcase:
-    """The labelled instant with most boxes after the first second, else a recording's middle."""
+    """An instant after the first second with many classes, about four boxes, and those large.
+
+    More boxes hide each other. Without labels it is the middle of the first recording.
+    """
     best = Showcase(recording=recordings[0], index=len(recordings[0].frame_times_us) // 2)
-    most = -1
+    most: tuple[float, ...] = ()
     for recording in recordings:
         start = int(np.searchsorted(recording.frame_times_us, recording.frame_times_us[0] + 10**6))
         for index in range(start, len(recording.frame_times_us)):
             if recording.tracks is None:
                 break
             shown = Showcase(recording=recording, index=index)
-            count = len(shown.truth(protocol).labels)
-            if count > most:
-                best, most = shown, count
+            truth = shown.truth(protocol)
+            sides = truth.corners[:, 2:] - truth.corners[:, :2]
+            count = len(truth.labels)
+            worth = (
+                len(set(truth.labels.tolist())),
+                -abs(count - WELCOME_BOXES),
+                sides.prod(1).sum(),
+            )
+            if worth > most:
+                best, most = shown, worth
     return best
 
 
