@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from eqs.events import Events
 from eqs.representations import stacked_histogram
 
-GOLDEN = Path(__file__).parents[1] / "golden" / "rvt" / "histogram.npz"
+GOLDEN = Path(__file__).parents[1] / "golden" / "rvt" / "representations.npz"
 
 
 def plain_histogram(events, bins, start, stop, cutoff):
