@@ -83,7 +83,15 @@ def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]
 def build_trainer(cfg: DictConfig, run: Run) -> lightning.Trainer:
     """The configured trainer, writing into the run's folder."""
     last = ModelCheckpoint(run.checkpoints, filename="last", enable_version_counter=False)
-    callbacks: list[Callback] = [last, *instantiate(cfg.callbacks).values()]
+    best = ModelCheckpoint(
+        run.checkpoints,
+        filename="best",
+        monitor="val/map",
+        mode="max",
+        save_weights_only=True,
+        enable_version_counter=False,
+    )
+    callbacks: list[Callback] = [last, best, *instantiate(cfg.callbacks).values()]
     loggers = [logger(save_dir=run.folder) for logger in instantiate(cfg.logger).values()]
     return instantiate(cfg.trainer, callbacks=callbacks, logger=loggers)
 
