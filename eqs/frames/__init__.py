@@ -3,10 +3,12 @@
 from eqs.frames.checks import checked_frames, checked_times
 from eqs.frames.folder import FrameFolder, image_paths, read_image
 from eqs.frames.luma import GreyImage, luma
+from eqs.frames.video import VideoFile
 
 __all__ = [
     "FrameFolder",
     "GreyImage",
+    "VideoFile",
     "checked_frames",
     "checked_times",
     "image_paths",

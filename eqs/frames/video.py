@@ -1,0 +1,85 @@
+"""Clips stored as a video file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class VideoFile:
+    """A video, decoded a few frames at a time, with the times that the file gives its frames.
+
+    Convention: a frame's time is its presentation time in whole microseconds, rounded down, so
+    irregular times stay irregular. Colour is decoded to RGB, grey videos stay grey.
+
+    Args:
+        path: a file that FFmpeg can read.
+        chunk: frames to hold in memory at once.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: PyAV, the optional dependency `video`, is not installed; or, while iterating,
+            the file has no video that can be decoded.
+    """
+
+    def __init__(self, path: Path | str, chunk: int = 8) -> None:
+        """Check that the file and its decoder are there; nothing is decoded yet."""
+        self.path, self.chunk = Path(path), chunk
+        if not self.path.is_file():
+            raise FileNotFoundError(f"Expected a video at {self.path}, found none; set frames")
+        try:
+            import av  # noqa: F401
+        except ModuleNotFoundError as error:
+            raise ValueError(
+                f"Expected PyAV to decode {self.path}, found none; install it with pip install av, "
+                "or give a folder of images"
+            ) from error
+
+    def __len__(self) -> int:
+        """Number of frames that the file states, 0 where it states none."""
+        import av
+
+        try:
+            with av.open(str(self.path)) as container:
+                return container.streams.video[0].frames if container.streams.video else 0
+        except av.FFmpegError:
+            return 0
+
+    def __iter__(self) -> Iterator[tuple[NDArray[Any], NDArray[np.int64]]]:
+        """Chunks of frames with their times, from the first to the last."""
+        images: list[NDArray[Any]] = []
+        times: list[int] = []
+        for image, time_us in self._decoded():
+            images.append(image)
+            times.append(time_us)
+            if len(images) == self.chunk:
+                yield np.stack(images), np.array(times, np.int64)
+                images, times = [], []
+        if images:
+            yield np.stack(images), np.array(times, np.int64)
+
+    def _decoded(self) -> Iterator[tuple[NDArray[Any], int]]:
+        import av
+
+        try:
+            with av.open(str(self.path)) as container:
+                if not container.streams.video:
+                    raise ValueError(f"Expected a video stream in {self.path}, got none")
+                for frame in container.decode(video=0):
+                    if frame.pts is None or frame.time_base is None:
+                        raise ValueError(
+                            f"Expected a time for every frame of {self.path}, got none; convert "
+                            "it to a container that keeps times, such as MP4"
+                        )
+                    grey = frame.format.name.startswith("gray")
+                    time_us = int(frame.pts * frame.time_base * 1_000_000)
+                    yield frame.to_ndarray(format="gray" if grey else "rgb24"), time_us
+        except av.FFmpegError as error:
+            raise ValueError(
+                f"Expected {self.path} to be a video that FFmpeg decodes, got: {error}; replace "
+                "the damaged file or convert it to images"
+            ) from error

@@ -1,0 +1,148 @@
+"""Simulate the events of one clip into one file."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from eqs.events import EventWriter
+from eqs.files import read_json, write_json
+from eqs.frames import FrameFolder, VideoFile, image_paths
+from eqs.pipelines.command import explained
+from eqs.simulators import Simulator
+
+log = logging.getLogger(__name__)
+TIMES = "timestamps.txt"
+
+
+@explained
+def simulate(cfg: DictConfig) -> None:
+    """Write `cfg.out`, a DSEC event file, from a folder of images or a video.
+
+    Beside it lies `<out>.json`, which says how it was made; a file that was made the same way from
+    the same frames is kept.
+
+    Raises:
+        FileNotFoundError: there are no frames.
+        ValueError: the frames have no times, or the simulator is none.
+    """
+    simulator = instantiate(cfg.sim)
+    if not isinstance(simulator, Simulator):
+        raise ValueError(f"Expected a simulator, got sim={simulator.name}; set sim=esim or another")
+    out, source = Path(cfg.out), Path(cfg.frames)
+    record = out.with_name(out.name + ".json")
+    description = {
+        "simulator": simulator.name,
+        "parameters": simulator.parameters(),
+        "version": simulator.version,
+        "frames": fingerprint(source, cfg.frames_per_second),
+    }
+    if out.exists() and record.exists() and not cfg.overwrite:
+        if read_json(record)["description"] == description:
+            log.info("%s is made of these frames already; overwrite=true makes it again", out)
+            return
+        raise ValueError(
+            f"Expected no other events at {out}, got some; set out, or overwrite=true to replace"
+        )
+    frames, events = write_events(simulator, open_clip(source, cfg.frames_per_second), out)
+    write_json(record, {"description": description, "events": events, "frames": frames})
+    log.info("%s: %d events from %d frames", out, events, frames)
+
+
+def open_clip(source: Path, frames_per_second: float | None) -> FrameFolder | VideoFile:
+    """A folder of images with its times, or a video with those it carries.
+
+    The times of a folder are those in `timestamps.txt` in or beside it, whole microseconds, one a
+    line; without that file they follow from the frame rate.
+
+    Raises:
+        ValueError: a folder has neither times nor a frame rate, or a video is given a rate.
+    """
+    if not source.is_dir():
+        if frames_per_second is not None:
+            raise ValueError(
+                f"Expected no frame rate for {source}, whose frames carry times; leave "
+                "frames_per_second out"
+            )
+        return VideoFile(source)
+    files = [folder / TIMES for folder in (source, source.parent) if (folder / TIMES).is_file()]
+    if files and frames_per_second is None:
+        return FrameFolder(source, read_times(files[0]))
+    if frames_per_second is None or not frames_per_second > 0:
+        raise ValueError(
+            f"Expected {TIMES} in {source} or beside it, or a frame rate above zero, got "
+            f"{frames_per_second!r}; set frames_per_second"
+        )
+    count = len(image_paths(source))
+    times = np.arange(count, dtype=np.int64) * 1_000_000 / frames_per_second
+    return FrameFolder(source, np.floor(times).astype(np.int64))
+
+
+def read_times(path: Path) -> np.ndarray:
+    """Whole microseconds, one a line.
+
+    Raises:
+        ValueError: a line holds something else.
+    """
+    try:
+        return np.array([int(line) for line in path.read_text().split()], np.int64)
+    except ValueError as error:
+        raise ValueError(
+            f"Expected whole microseconds in {path}, one a line, got: {error}; correct the file "
+            "or set frames_per_second"
+        ) from error
+
+
+def write_events(simulator: Simulator, clip: FrameFolder | VideoFile, out: Path) -> tuple[int, int]:
+    """Simulate chunk by chunk, in memory that does not grow with the clip; frames and events."""
+    stream = simulator.start(out.stem)
+    chunks = iter(clip)
+    images, times_us = next(chunks, (np.empty((0, 1, 1), np.uint8), np.empty(0, np.int64)))
+    height, width = images.shape[1:3]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rates]}"),
+        TimeRemainingColumn(),
+    )
+    offset_us = int(times_us[0]) if len(times_us) else 0
+    frames = count = 0
+    with (
+        EventWriter(out, height, width, t_offset_us=offset_us) as writer,
+        Progress(*columns) as progress,
+    ):
+        task = progress.add_task(simulator.name, total=len(clip) or None, rates="")
+        while len(images):
+            events = stream.step(images, times_us)
+            writer.append(events)
+            frames, count = frames + len(images), count + len(events)
+            so_far = rates(progress.tasks[0].elapsed, frames, count)
+            progress.update(task, advance=len(images), rates=so_far)
+            images, times_us = next(chunks, (images[:0], times_us[:0]))
+        events = stream.finish()
+        writer.append(events)
+    return frames, count + len(events)
+
+
+def rates(seconds: float | None, frames: int, events: int) -> str:
+    """Frames and events per second so far, in words."""
+    if not seconds:
+        return ""
+    return f"{frames / seconds:.0f} frames/s, {events / seconds / 1e6:.2f} Mev/s"
+
+
+def fingerprint(source: Path, frames_per_second: float | None) -> dict[str, Any]:
+    """What tells one set of frames from another: names, sizes and times of change."""
+    paths = image_paths(source) if source.is_dir() else [source] if source.is_file() else []
+    return {
+        "files": [[path.name, path.stat().st_size, path.stat().st_mtime_ns] for path in paths],
+        "frames_per_second": frames_per_second,
+    }

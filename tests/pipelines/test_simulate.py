@@ -1,0 +1,98 @@
+"""One clip to one event file, as scripts/simulate.py does it."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hydra import compose, initialize_config_dir
+from PIL import Image
+
+from eqs.events import Events
+from eqs.pipelines.simulate import simulate
+from eqs.simulators import V2E
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.fixture
+def clip(tmp_path):
+    """A folder of twenty random frames at 100 Hz, and the frames."""
+    frames = np.random.default_rng(0).integers(0, 256, (20, 12, 16), dtype=np.uint8)
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for index, frame in enumerate(frames):
+        Image.fromarray(frame).save(folder / f"{index:03d}.png")
+    return folder, frames
+
+
+def run(folder, out, *overrides):
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("simulate", [f"frames={folder}", f"out={out}", *overrides])
+    simulate(cfg)
+
+
+def test_the_file_holds_what_the_simulator_gives(clip, tmp_path):
+    folder, frames = clip
+    out = tmp_path / "new" / "events.h5"
+    run(folder, out, "sim=v2e", "frames_per_second=100", "sim.threshold_on_log=0.4")
+    found = Events.load(out)
+    expected = V2E(threshold_on_log=0.4).start("events")
+    parts = [expected.step(frames, np.arange(20) * 10_000), expected.finish()]
+    wanted = Events.concatenate(parts)
+    assert len(found) == len(wanted) > 1000
+    for name in "txyp":
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+
+
+def test_times_beside_the_folder_are_taken(clip, tmp_path):
+    folder, _ = clip
+    times = 7_000_000 + 33_333 * np.arange(20)
+    (tmp_path / "timestamps.txt").write_text("\n".join(map(str, times)))
+    run(folder, tmp_path / "events.h5")
+    found = Events.load(tmp_path / "events.h5")
+    assert times[0] <= found.t[0]
+    assert found.t[-1] <= times[-1]
+
+
+def test_a_finished_file_is_kept_and_another_refused(clip, tmp_path, caplog):
+    folder, _ = clip
+    out = tmp_path / "events.h5"
+    run(folder, out, "frames_per_second=30")
+    before = out.stat().st_mtime_ns
+    run(folder, out, "frames_per_second=30")
+    assert out.stat().st_mtime_ns == before
+    with pytest.raises(SystemExit):
+        run(folder, out, "frames_per_second=25")
+    assert "set out, or overwrite=true" in caplog.text
+    run(folder, out, "frames_per_second=25", "overwrite=true")
+    assert out.stat().st_mtime_ns != before
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        ([], "Expected timestamps.txt in .* or a frame rate above zero, got None"),
+        (["frames_per_second=0"], "a frame rate above zero, got 0; set frames_per_second"),
+        (["frames_per_second=30", "sim=real"], "Expected a simulator, got sim=real"),
+        (["frames_per_second=30", "frames=nowhere"], "Expected no frame rate for nowhere"),
+        (["frames=nowhere"], "Expected a video at nowhere, found none; set frames"),
+    ],
+)
+def test_mistakes_end_in_one_sentence_and_leave_nothing(clip, tmp_path, caplog, overrides, message):
+    folder, _ = clip
+    with pytest.raises(SystemExit):
+        run(folder, tmp_path / "events.h5", *overrides)
+    assert len(caplog.messages) == 1
+    assert re.search(message, caplog.messages[0])
+    assert list(tmp_path.glob("events*")) == []
+
+
+def test_a_single_frame_is_no_clip(clip, tmp_path, caplog):
+    folder, _ = clip
+    for path in sorted(folder.iterdir())[1:]:
+        path.unlink()
+    with pytest.raises(SystemExit):
+        run(folder, tmp_path / "events.h5", "frames_per_second=30")
+    assert "at least two frames, got 1" in caplog.text
+    assert list(tmp_path.glob("events*")) == []
