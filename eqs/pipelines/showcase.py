@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from eqs.data import Binning, EvaluationDataset, EventSource, LabelProtocol, Recording, WindowSource
+from eqs.data import EventSource, LabelProtocol, Recording
 from eqs.events import EventReader, Events
-from eqs.models import RVTDetector, postprocess
+from eqs.pipelines.detections import detections_over
 from eqs.pipelines.runs import Run
 from eqs.study import Boxes
 
@@ -84,37 +84,9 @@ def choose(recordings: Sequence[Recording], protocol: LabelProtocol) -> Showcase
 
 def detections(showcase: Showcase, run: Run, protocol: LabelProtocol) -> Boxes:
     """What a trained detector finds in the real events at the instant, having seen all before."""
-    config = run.config()
-    binning = Binning(
-        bins=config.datamodule.bins,
-        window_us=config.datamodule.window_us,
-        count_cutoff=config.datamodule.count_cutoff,
-    )
-    source = WindowSource(
-        recording=showcase.recording,
-        events_path=showcase.recording.events_path,
-        protocol=protocol,
-        binning=binning,
-    )
-    model = RVTDetector.from_checkpoint(
-        run.weights, partition_split_32=config.model.partition_split_32
-    ).eval()
-    states = None
-    last = showcase.index - 1  # window i ends at frame i + 1
-    with torch.no_grad():
-        chunks = EvaluationDataset([source], chunk_length=10)
-        for chunk in range(len(chunks)):
-            histograms = chunks[chunk]["histograms"].float()
-            maps, states = model.backbone.forward_sequence(histograms, states)
-            if last < len(maps[0]):
-                break
-            last -= len(maps[0])
-        found = postprocess(model.detect([stage[last] for stage in maps]))[0]
-    return Boxes(
-        corners=found["boxes"].numpy(),
-        labels=found["labels"].numpy(),
-        scores=found["scores"].numpy(),
-    )
+    recording = showcase.recording
+    found = detections_over(run, recording, recording.events_path, protocol)
+    return next(islice(found, showcase.index - 1, None))  # the first is the second frame's
 
 
 def around(showcase: Showcase, sources: Mapping[str, EventSource]) -> dict[str, Events]:

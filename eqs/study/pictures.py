@@ -147,14 +147,14 @@ def detection_panels(
         _draw_boxes(panels[0], truth, class_names, dashed=True, named=True)
         for axes, (name, found) in zip(panels[1:], detections.items(), strict=True):
             axes.imshow(image, interpolation="nearest")
-            kept = _above(found, min_score)
+            kept = above(found, min_score)
             _draw_boxes(axes, truth, class_names, dashed=True)
             _draw_boxes(axes, kept, class_names)
             axes.set_title(f"trained on {_named(name)}: {len(kept.labels)} found")
         present = np.unique(
             np.concatenate([truth.labels, *(found.labels for found in detections.values())])
         ).astype(int)
-        keys = [Line2D([], [], color=_box_colour(label)) for label in present]
+        keys = [Line2D([], [], color=box_colour(label)) for label in present]
         names = [class_names[label] for label in present]
         keys.append(Line2D([], [], color="#222222", linestyle="--"))
         drawing.legend(
@@ -242,14 +242,16 @@ def _named(name: str) -> str:
     return "real events" if name == REFERENCE else name
 
 
-def _above(boxes: Boxes, min_score: float) -> Boxes:
+def above(boxes: Boxes, min_score: float) -> Boxes:
+    """The boxes whose confidence reaches `min_score`; true boxes are all kept."""
     if boxes.scores is None:
         return boxes
     kept = np.asarray(boxes.scores) >= min_score
     return Boxes(corners=boxes.corners[kept], labels=boxes.labels[kept], scores=boxes.scores[kept])
 
 
-def _box_colour(label: int) -> str:
+def box_colour(label: int) -> str:
+    """The colour that stands for a class in every picture."""
     return BOX_COLOURS[label % len(BOX_COLOURS)]
 
 
@@ -263,7 +265,7 @@ def _draw_boxes(
 ) -> None:
     for at, (left, top, right, bottom) in enumerate(boxes.corners):
         label = int(boxes.labels[at])
-        colour = "#222222" if dashed and not named else _box_colour(label)
+        colour = "#222222" if dashed and not named else box_colour(label)
         axes.add_patch(
             Rectangle(
                 (left - 0.5, top - 0.5),

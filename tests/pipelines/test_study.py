@@ -1,6 +1,7 @@
 """The whole chain through the real configuration, on a world of a few tiny sequences."""
 
 import json
+import runpy
 from pathlib import Path
 
 import pandas as pd
@@ -8,6 +9,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig, open_dict
+from PIL import Image
 
 import eqs
 from eqs.pipelines import evaluate, register_resolvers, train
@@ -73,6 +75,8 @@ def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, dict]) -
         runs = finished_runs(place / "runs/dsec_mini_smoke")
         return [run.weights.stat().st_mtime_ns for run in runs]
 
+    checkpoints = {path.name for path in (place / "runs").rglob("*.ckpt")}
+    assert checkpoints == {"best.ckpt", "last.ckpt", "weights.ckpt"}
     before = stamps()
     assert train(configured(place, "sim=esim")) == trained["esim"]
     assert stamps() == before
@@ -92,6 +96,36 @@ def test_an_interrupted_run_ends_with_the_same_numbers(
     result = train(configured(place, *elsewhere))
     for stream in ("own", "real"):
         assert result[stream] == trained["esim"][stream]
+
+
+@pytest.mark.slow
+def test_a_refused_overwrite_keeps_the_old_run(
+    place: Path, trained: dict[str, dict], caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(SystemExit):
+        train(configured(place, "sim=esim", "overwrite=true", "ckpt_path=nowhere.ckpt"))
+    assert "Expected a checkpoint at nowhere.ckpt" in caplog.text
+    with pytest.raises(SystemExit):
+        train(configured(place, "sim=esim", "overwrite=true", "recipe.learning_rate=abc"))
+    assert len(list(finished_runs(place / "runs/dsec_mini_smoke"))) == len(trained)
+
+
+@pytest.mark.slow
+def test_detections_are_filmed(
+    place: Path, trained: dict[str, dict], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = next(finished_runs(place / "runs/dsec_mini_smoke")).folder
+    recording = next((place / "datasets").glob("*/test/*"))
+    out = place / "film.gif"
+    monkeypatch.setattr(
+        "sys.argv", ["watch.py", str(run), str(recording), str(out), "--min-score", "0"]
+    )
+    runpy.run_path(str(CONFIGS.parent / "scripts" / "watch.py"), run_name="__main__")
+    with Image.open(out) as film:
+        assert (film.width, film.height) == (4 * 64, 4 * 48)
+        film.seek(film.n_frames - 1)
+        colours = {tuple(colour) for _, colour in film.convert("RGB").getcolors(100_000)}
+    assert len(colours) > 3  # white, both polarities, and boxes
 
 
 @pytest.mark.slow

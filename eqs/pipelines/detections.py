@@ -1,0 +1,51 @@
+"""What a trained detector finds in a recording, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import torch
+
+from eqs.data import Binning, EvaluationDataset, LabelProtocol, Recording, WindowSource
+from eqs.models import RVTDetector, postprocess
+from eqs.pipelines.runs import Run
+from eqs.study import Boxes
+
+
+def detections_over(
+    run: Run, recording: Recording, events_path: Path, protocol: LabelProtocol
+) -> Iterator[Boxes]:
+    """Detections at the second, third, ... frame, each after everything before it was seen.
+
+    Args:
+        run: a finished training.
+        recording: frame times and size.
+        events_path: the events to look at, recorded or simulated.
+        protocol: gives the rows that are used.
+    """
+    config = run.config()
+    binning = Binning(
+        bins=config.datamodule.bins,
+        window_us=config.datamodule.window_us,
+        count_cutoff=config.datamodule.count_cutoff,
+    )
+    source = WindowSource(
+        recording=recording, events_path=events_path, protocol=protocol, binning=binning
+    )
+    model = RVTDetector.from_checkpoint(
+        run.weights, partition_split_32=config.model.partition_split_32
+    ).eval()
+    states = None
+    chunks = EvaluationDataset([source], chunk_length=10)
+    for chunk in range(len(chunks)):
+        with torch.no_grad():
+            histograms = chunks[chunk]["histograms"].float()
+            maps, states = model.backbone.forward_sequence(histograms, states)
+            found = postprocess(model.detect([stage.flatten(0, 1) for stage in maps]))
+        for each in found:
+            yield Boxes(
+                corners=each["boxes"].numpy(),
+                labels=each["labels"].numpy(),
+                scores=each["scores"].numpy(),
+            )
