@@ -15,8 +15,10 @@ from eqs.study.figures import (
     event_rate,
     rate_curves,
     score_against_accuracy,
+    score_curve,
     sequence_dots,
 )
+from eqs.study.film import event_pictures, with_boxes, write_film
 from eqs.study.pictures import Boxes, detection_panels, event_image, events_panels, score_maps
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
@@ -53,6 +55,7 @@ __all__ = [
     "drops",
     "eqs_table",
     "event_image",
+    "event_pictures",
     "event_rate",
     "events_panels",
     "print_eqs",
@@ -66,13 +69,16 @@ __all__ = [
     "save_figure",
     "scaled_score",
     "score_against_accuracy",
+    "score_curve",
     "score_maps",
     "sequence_dots",
     "simulated",
     "study_table",
     "summarise_eqs",
     "summarise_study",
+    "with_boxes",
     "write_correlations",
+    "write_film",
     "write_report",
     "write_table",
 ]

@@ -261,3 +261,29 @@ def rate_curves(
         axes.margins(x=0)
         drawing.legend(loc="outside upper left", ncols=len(rates) + 1)
     return drawing
+
+
+def score_curve(
+    curve: ArrayLike, *, warmup: int, window_us: int, ceiling: float | None = None
+) -> Figure:
+    """EQS of every window over time.
+
+    Args:
+        curve: score of every window from the start on, shape (windows,).
+        warmup: windows at the start that do not count, drawn pale.
+        window_us: length of a window.
+        ceiling: what the real stream, slightly thinned, scores; drawn as a line.
+    """
+    values = np.asarray(curve, dtype=float)
+    ends_s = np.arange(1, len(values) + 1) * window_us / 1e6
+    with mpl.rc_context(STYLE):
+        drawing = figure(9, 3.2)
+        axes = drawing.subplots()
+        axes.plot(ends_s[: warmup + 1], values[: warmup + 1], color="#bbbbbb", label="warm-up")
+        axes.plot(ends_s[warmup:], values[warmup:], color="#1f4e79", label="EQS of the window")
+        if ceiling is not None:
+            axes.axhline(ceiling, color="#777777", linestyle="--", linewidth=1, label="ceiling")
+        axes.set(xlabel="time, s", ylabel="EQS (higher is better)")
+        axes.margins(x=0)
+        drawing.legend(loc="outside upper left", ncols=3)
+    return drawing

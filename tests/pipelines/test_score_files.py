@@ -1,0 +1,59 @@
+"""Two event files to one score, as scripts/score.py does it."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hydra import compose, initialize_config_dir
+
+from eqs.pipelines.score_files import score_files
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.fixture
+def files(make_events, tmp_path):
+    """Two seconds of two unrelated streams, 64x96 pixels."""
+    paths = []
+    for seed in (0, 1):
+        path = tmp_path / f"{seed}.h5"
+        make_events(40_000, 64, 96, stop_us=2_000_000, seed=seed).save(path)
+        paths.append(path)
+    return paths
+
+
+def run(simulated, real, out, *overrides):
+    given = [f"simulated={simulated}", f"real={real}", f"out={out}", "eqs.weights=random"]
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("score", [*given, f"paths.runs={out}/runs", *overrides])
+    score_files(cfg)
+
+
+def test_a_stream_against_itself_scores_one_everywhere(files, tmp_path):
+    run(files[0], files[0], tmp_path / "out")
+    found = json.loads((tmp_path / "out" / "score.json").read_text())
+    assert found["eqs"] == pytest.approx(1.0, abs=1e-6)
+    assert all(score == pytest.approx(1.0, abs=1e-6) for score in found["readings"].values())
+    assert found["events"]["simulated"] == found["events"]["real"] > 0
+
+
+def test_files_beside_the_score(files, tmp_path):
+    out = tmp_path / "out"
+    run(files[1], files[0], out)
+    found = json.loads((out / "score.json").read_text())
+    assert found["eqs"] < found["anchors"]["ceiling"]["hidden_raw"] < 1.0
+    with (out / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    counted = [float(row["eqs"]) for row in rows if row["counts"] == "True"]
+    assert len(counted) == found["windows"]
+    assert np.mean(counted) == pytest.approx(found["eqs"], abs=1e-6)
+    assert {path.name for path in out.glob("*.png")} == {"map.png", "curve.png"}
+
+
+def test_a_missing_file_ends_in_one_sentence(files, tmp_path, caplog):
+    with pytest.raises(SystemExit):
+        run(tmp_path / "none.h5", files[0], tmp_path / "out")
+    assert "Expected an event file at" in caplog.text
+    assert not (tmp_path / "out" / "score.json").exists()
