@@ -1,0 +1,107 @@
+"""Time the simulators, on a clip that this program draws itself.
+
+Each simulator runs in a process of its own, once on a corner of the clip to compile, then on the
+whole. Frames are in memory before, events are complete and in order of time after.
+"""
+
+import argparse
+import multiprocessing
+import resource
+import sys
+import time
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from eqs import simulators
+
+NAMES = ("ESIM", "V2E", "PIX2NVS", "Prophesee", "CARLA", "Gazebo", "DVSVoltmeter", "ICNS")
+THRESHOLDS_LOG = (0.2, 0.02)
+PERIOD_US = 50_000
+
+
+def draw_clip(frames: int, height: int, width: int, seed: int = 0) -> np.ndarray:
+    """A texture with structure at all sizes that drifts by three pixels a frame, uint8."""
+    generator = np.random.default_rng(seed)
+    spectrum = np.fft.rfft2(generator.standard_normal((height, 2 * width)))
+    rate = np.hypot(np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(2 * width)[None])
+    rate[0, 0] = 1.0
+    spectrum /= rate**1.1
+    clip = np.empty((frames, height, width), np.uint8)
+    drift = np.exp(-2j * np.pi * np.fft.rfftfreq(2 * width) * 3.0)
+    low = high = None
+    for index in range(frames):
+        picture = np.fft.irfft2(spectrum * drift**index, s=(height, 2 * width))[:, :width]
+        if low is None or high is None:
+            low, high = picture.min(), picture.max()
+        clip[index] = np.clip(30.0 + 200.0 * (picture - low) / (high - low), 0, 255)
+    return clip
+
+
+def configured(name: str, threshold_log: float) -> Any:  # noqa: ANN401 - one of many classes
+    """The simulator with all its mean thresholds at one value, or None if it has no such one."""
+    kind = getattr(simulators, name)
+    names = {field.name for field in fields(kind)}
+    wanted = {"threshold_on_log", "threshold_off_log", "threshold_log"} & names
+    values = dict.fromkeys(wanted, threshold_log)
+    if "threshold_min_log" in names:
+        values["threshold_min_log"] = threshold_log
+    return kind(**values) if wanted else None
+
+
+def measure(job: tuple[str, float, tuple[int, int, int]]) -> tuple[int, float, float] | None:
+    """Events, seconds and MiB of memory beyond clip and program."""
+    name, threshold_log, shape = job
+    simulator = configured(name, threshold_log)
+    if simulator is None:
+        return None
+    clip, times_us = draw_clip(*shape), PERIOD_US * np.arange(shape[0])
+    run(simulator, clip[:4, :32, :32], times_us[:4])
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.perf_counter()
+    events = run(simulator, clip, times_us)
+    seconds = time.perf_counter() - start
+    return events, seconds, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+
+
+def run(simulator: simulators.Simulator, clip: np.ndarray, times_us: np.ndarray) -> int:
+    """Number of events of a clip, simulated in chunks as a study does."""
+    stream = simulator.start("benchmark")
+    chunks = range(0, len(clip), 8)
+    count = sum(len(stream.step(clip[k : k + 8], times_us[k : k + 8])) for k in chunks)
+    return count + len(stream.finish())
+
+
+def main() -> None:
+    """Print one row per simulator and threshold."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=["simulators"])
+    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--size", default="640x480", help="width and height")
+    parser.add_argument("--only", nargs="*", choices=NAMES, default=NAMES)
+    given = parser.parse_args()
+    width, _, height = given.size.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        sys.exit(f"Expected a size like 640x480, got {given.size}; set --size")
+    shape = (given.frames, int(height), int(width))
+    table = Table(title=f"{given.frames} frames of {given.size}")
+    for column in ("simulator", "threshold", "Mevents", "Mevents/s", "frames/s", "peak MiB"):
+        table.add_column(column, justify="left" if column == "simulator" else "right")
+    context = multiprocessing.get_context("spawn")
+    for name in given.only:
+        for threshold_log in THRESHOLDS_LOG:
+            with context.Pool(1) as pool:  # a fresh process: memory peaks do not mix
+                found = pool.apply(measure, ((name, threshold_log, shape),))
+            if found is None:
+                continue
+            events, seconds, memory = found
+            row = (events / 1e6, events / 1e6 / seconds, given.frames / seconds, memory)
+            table.add_row(name, str(threshold_log), *(f"{value:.1f}" for value in row))
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()
