@@ -21,7 +21,7 @@ def film(
     protocol, window_us = instantiate(config.protocol), config.datamodule.window_us
     times_us = recording.frame_times_us[1:]
     pictures = []
-    found = detections_over(run, recording, events_path, protocol)
+    found = detections_over(run, recording, events_path, protocol, min_score)
     with EventReader(events_path, recording.height, recording.width) as events:
         for time_us, boxes in zip(times_us.tolist(), found, strict=True):
             if time_us > times_us[0] + 1e6 * seconds:

@@ -14,7 +14,11 @@ from eqs.study import Boxes
 
 
 def detections_over(
-    run: Run, recording: Recording, events_path: Path, protocol: LabelProtocol
+    run: Run,
+    recording: Recording,
+    events_path: Path,
+    protocol: LabelProtocol,
+    min_score: float = 0.1,
 ) -> Iterator[Boxes]:
     """Detections at the second, third, ... frame, each after everything before it was seen.
 
@@ -23,6 +27,7 @@ def detections_over(
         recording: frame times and size.
         events_path: the events to look at, recorded or simulated.
         protocol: gives the rows that are used.
+        min_score: objectness times class confidence from which on a detection counts.
     """
     config = run.config()
     binning = Binning(
@@ -42,7 +47,8 @@ def detections_over(
         with torch.no_grad():
             histograms = chunks[chunk]["histograms"].float()
             maps, states = model.backbone.forward_sequence(histograms, states)
-            found = postprocess(model.detect([stage.flatten(0, 1) for stage in maps]))
+            predictions = model.detect([stage.flatten(0, 1) for stage in maps])
+            found = postprocess(predictions, min_score)
         for each in found:
             yield Boxes(
                 corners=each["boxes"].numpy(),

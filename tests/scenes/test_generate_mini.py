@@ -166,7 +166,7 @@ def test_at_least_a_fifth_of_each_split_is_night():
 
 @pytest.mark.parametrize("size", ["128", "axb", "0x96", "128x"])
 def test_impossible_sizes_are_refused(size):
-    with pytest.raises(ValueError, match=r"like 128x96.*data\.generator\.size"):
+    with pytest.raises(ValueError, match=r"like 128x96.*set data\.size"):
         DSECMini(size=size)
 
 
