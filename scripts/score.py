@@ -16,8 +16,7 @@ def main(cfg: DictConfig) -> None:
 
 if __name__ == "__main__":
     # Hydra reads only key=value: the first two plain arguments are the files.
-    names = iter(("simulated", "real"))
-    plain = [a for a in sys.argv[1:] if "=" not in a and not a.startswith("-")][:2]
-    named = {argument: f"{name}={argument}" for name, argument in zip(names, plain, strict=False)}
-    sys.argv[1:] = [named.get(argument, argument) for argument in sys.argv[1:]]
+    plain = [k for k, a in enumerate(sys.argv) if k and "=" not in a and not a.startswith("-")]
+    for key, place in zip(("simulated", "real"), plain, strict=False):
+        sys.argv[place] = f"{key}={sys.argv[place]}"
     main()

@@ -90,7 +90,16 @@ def score_recording(
         start_us=start,
         stop_us=stop,
     )
-    known = score_anchors(judge, recording, real, other, start, stop)
+    alike = other is not None and (other.height, other.width) == (real.height, real.width)
+    known = score_anchors(
+        judge,
+        real,
+        start,
+        stop,
+        other=other if alike else None,
+        frame_times_us=recording.frame_times_us,
+        key=recording.name,
+    )
     shared = {
         "sequence": recording.name,
         "eqs_chance": known.get("chance", {}).get(judge.headline.name, np.nan),
@@ -120,24 +129,25 @@ def score_recording(
 
 def score_anchors(
     judge: Judge,
-    recording: Recording,
     real: EventReader,
-    other: EventReader | None,
     start_us: int,
     stop_us: int,
+    *,
+    other: EventReader | None = None,
+    frame_times_us: NDArray[np.int64] | None = None,
+    key: str = "",
 ) -> dict[str, dict[str, float]]:
-    """Scores by anchor and reading."""
+    """Scores by anchor and reading; those that need `other` or frames are left out without them."""
     stop_us = min(stop_us, start_us + ANCHOR_US)
     events = real.window(start_us, stop_us)
-    alike = other is not None and (other.height, other.width) == (real.height, real.width)
     streams = anchors(
         events,
-        other=other.window(other.start_us, other.start_us + ANCHOR_US) if other and alike else None,
-        frame_times_us=recording.frame_times_us,
+        other=None if other is None else other.window(other.start_us, other.start_us + ANCHOR_US),
+        frame_times_us=frame_times_us,
         window_us=judge.headline.definition.window_us,
         start_us=start_us,
         stop_us=stop_us,
-        key=recording.name,
+        key=key,
     )
     found = score_streams(
         judge.backbone,

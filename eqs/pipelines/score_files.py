@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 from omegaconf import DictConfig
 from rich.console import Console
 from rich.table import Table
@@ -13,13 +14,10 @@ from rich.table import Table
 from eqs.events import EventReader
 from eqs.files import write_json
 from eqs.metrics import score_streams
-from eqs.metrics.corruptions import anchors
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import Judge, find_judge
-from eqs.study import save_figure, score_curve, score_maps
-
-# Anchors are made in memory, so they look at no more than the first quarter of a minute.
-ANCHOR_US = 15_000_000
+from eqs.pipelines.score import score_anchors
+from eqs.study import save_figure, score_curve, score_maps, write_table
 
 
 @explained
@@ -45,7 +43,7 @@ def score_files(cfg: DictConfig) -> None:
             start_us=span[0],
             stop_us=span[1],
         )[0]
-        known = known_scores(judge, real, *span)
+        known = score_anchors(judge, real, *span)
         counts = {
             "simulated": len(simulated.window(*span)),
             "real": len(real.window(*span)),
@@ -68,7 +66,14 @@ def score_files(cfg: DictConfig) -> None:
             "weights_sha256": judge.weights_sha256,
         },
     )
-    write_curve(out / "curve.csv", headline.curve.tolist(), headline.warmup, span[0], judge)
+    window_us = judge.headline.definition.window_us
+    number = np.arange(len(headline.curve))
+    curve = {
+        "stop_us": span[0] + (number + 1) * window_us,
+        "eqs": headline.curve,
+        "counts": number >= headline.warmup,
+    }
+    write_table(pd.DataFrame(curve), out / "curve.csv")
     panel = {"simulated": headline.map}
     drawn = score_maps(None, panel, patch_px=headline.patch_px, height=height, width=width)
     save_figure(drawn, out, "map")
@@ -76,45 +81,13 @@ def score_files(cfg: DictConfig) -> None:
         score_curve(
             headline.curve,
             warmup=headline.warmup,
-            window_us=judge.headline.definition.window_us,
+            window_us=window_us,
             ceiling=known["ceiling"][judge.headline.name],
         ),
         out,
         "curve",
     )
     show(scores, known, counts, judge, Console())
-
-
-def known_scores(
-    judge: Judge, real: EventReader, start_us: int, stop_us: int
-) -> dict[str, dict[str, float]]:
-    """Scores of streams that need no simulator, by anchor and reading."""
-    stop_us = min(stop_us, start_us + ANCHOR_US)
-    events = real.window(start_us, stop_us)
-    window_us = judge.headline.definition.window_us
-    streams = anchors(events, window_us=window_us, start_us=start_us, stop_us=stop_us)
-    found = score_streams(
-        judge.backbone,
-        events,
-        list(streams.values()),
-        judge.readings,
-        start_us=start_us,
-        stop_us=stop_us,
-    )
-    return {
-        name: {reading: score.score for reading, score in by_reading.items()}
-        for name, by_reading in zip(streams, found, strict=True)
-    }
-
-
-def write_curve(path: Path, curve: list[float], warmup: int, start_us: int, judge: Judge) -> None:
-    """One row per window: its end, its score, and whether it counts."""
-    window_us = judge.headline.definition.window_us
-    with path.open("w", newline="") as file:
-        rows = csv.writer(file)
-        rows.writerow(["stop_us", "eqs", "counts"])
-        for index, score in enumerate(curve):
-            rows.writerow([start_us + (index + 1) * window_us, score, index >= warmup])
 
 
 def show(

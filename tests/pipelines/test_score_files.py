@@ -2,6 +2,7 @@
 
 import csv
 import json
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -57,3 +58,11 @@ def test_a_missing_file_ends_in_one_sentence(files, tmp_path, caplog):
         run(tmp_path / "none.h5", files[0], tmp_path / "out")
     assert "Expected an event file at" in caplog.text
     assert not (tmp_path / "out" / "score.json").exists()
+
+
+def test_two_plain_arguments_are_the_files_even_if_they_are_one(files, tmp_path, monkeypatch):
+    paths = [f"paths.{key}={tmp_path / key}" for key in ("runs", "results", "logs")]
+    given = [*map(str, (files[0], files[0])), "eqs.weights=random", f"out={tmp_path / 'out'}"]
+    monkeypatch.setattr("sys.argv", ["score.py", *given, *paths])
+    runpy.run_path(str(CONFIGS.parent / "scripts" / "score.py"), run_name="__main__")
+    assert json.loads((tmp_path / "out" / "score.json").read_text())["eqs"] == pytest.approx(1.0)
