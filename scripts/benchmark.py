@@ -18,8 +18,19 @@ from rich.table import Table
 
 from eqs import simulators
 
-NAMES = ("ESIM", "V2E", "PIX2NVS", "Prophesee", "CARLA", "Gazebo", "DVSVoltmeter", "ICNS")
+NAMES = (
+    "ESIM",
+    "V2E",
+    "PIX2NVS",
+    "Prophesee",
+    "CARLA",
+    "Gazebo",
+    "DVSVoltmeter",
+    "ICNS",
+    "ImprovedESIM",
+)
 THRESHOLDS_LOG = (0.2, 0.02)
+CONTRAST = {"threshold_on_log", "threshold_off_log", "threshold_log"}
 PERIOD_US = 50_000
 
 
@@ -41,23 +52,25 @@ def draw_clip(frames: int, height: int, width: int, seed: int = 0) -> np.ndarray
     return clip
 
 
+def has_threshold(name: str) -> bool:
+    """Whether the simulator has a contrast threshold to set; other models have other parameters."""
+    return bool(CONTRAST & {field.name for field in fields(getattr(simulators, name))})
+
+
 def configured(name: str, threshold_log: float) -> Any:  # noqa: ANN401 - one of many classes
-    """The simulator with all its mean thresholds at one value, or None if it has no such one."""
+    """The simulator with all its mean thresholds at one value, if it has such, else as it is."""
     kind = getattr(simulators, name)
     names = {field.name for field in fields(kind)}
-    wanted = {"threshold_on_log", "threshold_off_log", "threshold_log"} & names
-    values = dict.fromkeys(wanted, threshold_log)
+    values = dict.fromkeys(CONTRAST & names, threshold_log)
     if "threshold_min_log" in names:
         values["threshold_min_log"] = threshold_log
-    return kind(**values) if wanted else None
+    return kind(**values)
 
 
-def measure(job: tuple[str, float, tuple[int, int, int]]) -> tuple[int, float, float] | None:
+def measure(job: tuple[str, float, tuple[int, int, int]]) -> tuple[int, float, float]:
     """Events, seconds and MiB of memory beyond clip and program."""
     name, threshold_log, shape = job
     simulator = configured(name, threshold_log)
-    if simulator is None:
-        return None
     clip, times_us = draw_clip(*shape), PERIOD_US * np.arange(shape[0])
     run(simulator, clip[:4, :32, :32], times_us[:4])
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -92,14 +105,13 @@ def main() -> None:
         table.add_column(column, justify="left" if column == "simulator" else "right")
     context = multiprocessing.get_context("spawn")
     for name in given.only:
-        for threshold_log in THRESHOLDS_LOG:
+        for threshold_log in THRESHOLDS_LOG[: None if has_threshold(name) else 1]:
             with context.Pool(1) as pool:  # a fresh process: memory peaks do not mix
                 found = pool.apply(measure, ((name, threshold_log, shape),))
-            if found is None:
-                continue
             events, seconds, memory = found
             row = (events / 1e6, events / 1e6 / seconds, given.frames / seconds, memory)
-            table.add_row(name, str(threshold_log), *(f"{value:.1f}" for value in row))
+            shown = str(threshold_log) if has_threshold(name) else "its own"
+            table.add_row(name, shown, *(f"{value:.1f}" for value in row))
     Console().print(table)
 
 

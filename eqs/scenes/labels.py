@@ -28,7 +28,7 @@ TRACK_DTYPE: Final = np.dtype(
 
 @dataclass(frozen=True, kw_only=True)
 class LabelRule:
-    """Which actors in sight get a box; one narrower than this is a few pixels of a 128x96 image.
+    """Which actors in sight get a box; the default width is six columns of a 128x96 image.
 
     Args:
         smallest_width: least width of a clipped box, as a share of the image's.
