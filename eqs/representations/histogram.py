@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
+from eqs.representations.window import Span, events_inside
 
 
 def stacked_histogram(
@@ -17,7 +16,7 @@ def stacked_histogram(
     start_us: int | None = None,
     stop_us: int | None = None,
     count_cutoff: int | None = 10,
-    span: Literal["window", "events"] = "window",
+    span: Span = "window",
     wrap: bool = False,
 ) -> NDArray[np.uint8]:
     """Count the events of one window per polarity, time bin and pixel.
@@ -57,14 +56,8 @@ def stacked_histogram(
             f"Expected bins and count_cutoff of at least 1, got {bins} and {count_cutoff}; "
             "set both to positive numbers"
         )
-    if span not in ("window", "events"):
-        raise ValueError(f"Expected span to be 'window' or 'events', got {span!r}")
-    if start_us is not None and stop_us is not None and start_us >= stop_us:
-        raise ValueError(
-            f"Expected a window that ends after it starts, got [{start_us}, {stop_us}) us"
-        )
+    events = events_inside(events, start_us, stop_us, span)
     histogram = np.zeros((2, bins, events.height, events.width), np.uint8)
-    events = _inside(events, start_us, stop_us)
     if len(events):
         if span == "window":
             start = int(events.t[0]) if start_us is None else start_us
@@ -76,13 +69,6 @@ def stacked_histogram(
     if wrap:
         np.minimum(histogram, cutoff, out=histogram)
     return histogram.reshape(2 * bins, events.height, events.width)
-
-
-def _inside(events: Events, start_us: int | None, stop_us: int | None) -> Events:
-    """The part of the stream inside a window whose ends may be open."""
-    first = 0 if start_us is None else int(np.searchsorted(events.t, start_us, side="left"))
-    last = len(events) if stop_us is None else int(np.searchsorted(events.t, stop_us, side="left"))
-    return events[first:last]
 
 
 def _window_bins(t: NDArray[np.int64], bins: int, start: int, stop: int) -> NDArray[np.int64]:

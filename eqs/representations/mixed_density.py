@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
+from eqs.representations.window import Span, events_inside
 
 NEAR_ZERO = np.float32(1e-6)  # keeps the logarithm finite at both ends of a window
 
@@ -18,10 +17,10 @@ def mixed_density_stack(
     start_us: int | None = None,
     stop_us: int | None = None,
     cutoff: int | None = 32,
-    span: Literal["window", "events"] = "window",
+    span: Span = "window",
     wrap: bool = False,
 ) -> NDArray[np.int8]:
-    """Sum the polarities of a window over stretches that each end where the next begins to halve.
+    """Sum the polarities of a window over stretches of time, the newest the longest.
 
     The newest half of the window is the last bin, the quarter before it the one before, and so on;
     channel k is the sum of the bins 0 to k, so that the last channel holds every event and an early
@@ -58,15 +57,7 @@ def mixed_density_stack(
         raise ValueError(
             f"Expected at least 1 bin and a cutoff from 0 to 127, got {bins} and {cutoff}"
         )
-    if span not in ("window", "events"):
-        raise ValueError(f"Expected span to be 'window' or 'events', got {span!r}")
-    if start_us is not None and stop_us is not None and start_us >= stop_us:
-        raise ValueError(
-            f"Expected a window that ends after it starts, got [{start_us}, {stop_us}) us"
-        )
-    first = 0 if start_us is None else int(np.searchsorted(events.t, start_us))
-    last = len(events) if stop_us is None else int(np.searchsorted(events.t, stop_us))
-    events = events[first:last]
+    events = events_inside(events, start_us, stop_us, span)
     sums = np.zeros((bins, events.height, events.width), np.int64)
     if len(events):
         start, stop = int(events.t[0]), int(events.t[-1])
