@@ -10,7 +10,7 @@ from hydra.utils import instantiate
 from eqs.data import Recording
 from eqs.events import EventReader
 from eqs.pipelines import Run, detections_over
-from eqs.study import event_image, with_boxes, write_film
+from eqs.study import event_picture, with_boxes, write_film
 
 
 def film(
@@ -26,10 +26,8 @@ def film(
         for time_us, boxes in zip(times_us.tolist(), found, strict=True):
             if time_us > times_us[0] + 1e6 * seconds:
                 break
-            picture = 255 * event_image(events.window(time_us - window_us, time_us))
-            pictures.append(
-                with_boxes(picture.round().astype(np.uint8), boxes, min_score=min_score)
-            )
+            picture = event_picture(events.window(time_us - window_us, time_us))
+            pictures.append(with_boxes(picture, boxes, min_score=min_score))
     return pictures
 
 

@@ -11,6 +11,7 @@ from eqs.data import Binning, EvaluationDataset, LabelProtocol, Recording, Windo
 from eqs.models import RVTDetector, postprocess
 from eqs.pipelines.runs import Run
 from eqs.study import Boxes
+from eqs.tasks import large_detections
 
 
 def detections_over(
@@ -26,7 +27,7 @@ def detections_over(
         run: a finished training.
         recording: frame times and size.
         events_path: the events to look at, recorded or simulated.
-        protocol: gives the rows that are used.
+        protocol: gives the rows that are used, and whether small detections drop out.
         min_score: objectness times class confidence from which on a detection counts.
     """
     config = run.config()
@@ -49,6 +50,8 @@ def detections_over(
             maps, states = model.backbone.forward_sequence(histograms, states)
             predictions = model.detect([stage.flatten(0, 1) for stage in maps])
             found = postprocess(predictions, min_score)
+        if protocol.filter_detections:
+            found = [large_detections(each, protocol, recording.width) for each in found]
         for each in found:
             yield Boxes(
                 corners=each["boxes"].numpy(),

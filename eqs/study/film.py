@@ -10,11 +10,16 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from eqs.events import EventReader
+from eqs.events import EventReader, Events
 from eqs.study.pictures import Boxes, above, box_colour, event_image
 
 Picture = NDArray[np.uint8]
 STILLS = 8  # in a strip
+
+
+def event_picture(events: Events) -> Picture:
+    """The last event of every pixel on white, uint8 (H, W, 3)."""
+    return (255 * event_image(events)).round().astype(np.uint8)
 
 
 def event_pictures(
@@ -43,8 +48,7 @@ def event_pictures(
             f"got {pictures} pictures of {stop_us - start_us} us"
         )
     for end_us in np.linspace(start_us + window_us, stop_us, pictures).astype(np.int64):
-        events = reader.window(int(end_us) - window_us, int(end_us))
-        yield (255 * event_image(events)).round().astype(np.uint8)
+        yield event_picture(reader.window(int(end_us) - window_us, int(end_us)))
 
 
 def with_boxes(picture: Picture, boxes: Boxes, *, min_score: float = 0.3) -> Picture:

@@ -1,6 +1,6 @@
 """What one step of training or evaluation does."""
 
-from eqs.tasks.detection import DetectionTask
+from eqs.tasks.detection import DetectionTask, large_detections
 from eqs.tasks.progress import EpochLines
 
-__all__ = ["DetectionTask", "EpochLines"]
+__all__ = ["DetectionTask", "EpochLines", "large_detections"]
