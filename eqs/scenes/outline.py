@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numba import njit
@@ -37,6 +37,7 @@ from eqs.scenes.actors import (
     X,
     Z,
 )
+from eqs.scenes.light import HAZE, HAZE_REACH, Lit, face_light, local_light
 from eqs.scenes.optics import (
     CAM_COS,
     CAM_SIN,
@@ -44,120 +45,16 @@ from eqs.scenes.optics import (
     CAM_Z,
     FOCAL,
     MID_COLUMN,
-    MID_ROW,
     Array,
     convex_hull,
     project,
-    set_edges,
     signed_area,
 )
+from eqs.scenes.polygons import CORNERS, Polygons, store
 
 FAR_M: Final = 110.0
 REACH_M: Final = 5.0  # no part of an actor is farther from its middle
-CORNERS: Final = 8
-
-Lit = tuple[float, float, float, float]  # direction to the camera (x, z), headlights, lamps
-POLYGONS_PER_ACTOR: Final = 40
-BEAM_REACH_M: Final = 14.0  # depth at which headlights have lost half their effect
-LAMP_POOL_M: Final = 7.0  # half width of the pool of light under a street lamp
 PANE_INSET: Final = 0.18
-
-# Columns of a light vector: illuminance of a white surface at the focal plane, in lux; the sun's
-# horizontal direction; whether it is night; spacing of street lamps; radiance of the haze.
-AMBIENT, SUN, SUN_X, SUN_Z, BEAM, POOL, LAMP_SPACING, HAZE, HAZE_REACH = range(9)
-LIGHT_COLUMNS: Final = 9
-
-# Columns of polygon marks and values.
-EDGES, JOIN, X0, X1, Y0, Y1 = range(6)
-COLOUR, RING, STRENGTH = range(3)
-
-
-class Polygons(NamedTuple):
-    """Reusable storage for the polygons of one instant.
-
-    Args:
-        edges: half planes, shape (n, 8, 3).
-        marks: number of edges, way of joining, pixel bounds, shape (n, 6).
-        values: radiance in lux, ring width in pixels, opacity, shape (n, 3).
-        spans: first and one past last polygon of each actor, shape (actors, 2).
-        boxes: left, top, right, bottom of each actor's whole outline in pixels, shape (actors, 4).
-        order: actors from far to near, shape (actors,).
-        scratch: room for the corners of one part, shape (4, 16, 2).
-    """
-
-    edges: Array
-    marks: NDArray[np.int32]
-    values: Array
-    spans: NDArray[np.int32]
-    boxes: Array
-    order: NDArray[np.int64]
-    scratch: Array
-
-    @classmethod
-    def room_for(cls, actors: int) -> Polygons:
-        """Storage for this many actors."""
-        count = max(1, actors * POLYGONS_PER_ACTOR)
-        return cls(
-            edges=np.zeros((count, CORNERS, 3)),
-            marks=np.zeros((count, 6), np.int32),
-            values=np.zeros((count, 3)),
-            spans=np.zeros((actors, 2), np.int32),
-            boxes=np.zeros((actors, 4)),
-            order=np.zeros(actors, np.int64),
-            scratch=np.zeros((4, 16, 2)),
-        )
-
-
-@njit(cache=True, error_model="numpy")
-def _store(
-    polygons: Polygons,
-    used: int,
-    corners: Array,
-    count: int,
-    join: int,
-    colour: float,
-    ring_px: float,
-    strength: float,
-    camera: Array,
-) -> int:
-    edges = set_edges(corners, count, polygons.edges[used])
-    if edges == 0:
-        return used
-    left, right, top, bottom = 1e9, -1e9, 1e9, -1e9
-    for i in range(count):
-        left, right = min(left, corners[i, 0]), max(right, corners[i, 0])
-        top, bottom = min(top, corners[i, 1]), max(bottom, corners[i, 1])
-    width, height = 2.0 * camera[MID_COLUMN], 2.0 * camera[MID_ROW]
-    if right < -1.0 or bottom < -1.0 or left > width + 1.0 or top > height + 1.0:
-        return used
-    marks = polygons.marks[used]
-    marks[EDGES], marks[JOIN] = edges, join
-    marks[X0] = max(0.0, math.floor(left - 0.5))
-    marks[X1] = min(width, math.ceil(right + 0.5))
-    marks[Y0] = max(0.0, math.floor(top - 0.5))
-    marks[Y1] = min(height, math.ceil(bottom + 0.5))
-    values = polygons.values[used]
-    values[COLOUR], values[RING], values[STRENGTH] = colour, ring_px, strength
-    return used + 1
-
-
-@njit(cache=True, error_model="numpy")
-def _face_light(nx: float, nz: float, up: float, light: Array, lit: Lit) -> float:
-    """Illuminance of a face; `lit` is view direction x, z, then beam and lamp light here."""
-    sun = max(0.0, nx * light[SUN_X] + nz * light[SUN_Z]) + 0.8 * up
-    towards = max(0.2, nx * lit[0] + nz * lit[1])
-    return light[AMBIENT] + light[SUN] * sun + lit[2] * towards + lit[3] * (0.5 + 0.5 * up)
-
-
-@njit(cache=True, error_model="numpy")
-def _local_light(x: float, z: float, depth: float, camera: Array, light: Array) -> Lit:
-    dx, dz = camera[CAM_X] - x, camera[CAM_Z] - z
-    distance = max(math.sqrt(dx * dx + dz * dz), 1e-3)
-    beside = (dx * camera[CAM_COS] - dz * camera[CAM_SIN]) / (0.4 * depth + 1.0)
-    beam = light[BEAM] * math.exp(-beside * beside) / (1.0 + (depth / BEAM_REACH_M) ** 2)
-    gap = z - light[LAMP_SPACING] * math.floor(z / light[LAMP_SPACING] + 0.5)
-    pool = light[POOL] * math.exp(-((gap / LAMP_POOL_M) ** 2))
-    return dx / distance, dz / distance, beam, pool
 
 
 @njit(cache=True, error_model="numpy")
@@ -238,10 +135,10 @@ def _add_faces(
         if signed_area(quad, 4) >= 0.0:  # seen from inside
             continue
         nx, nz = side * cosine + along * sine, along * cosine - side * sine
-        shade = fade * _face_light(nx, nz, 1.0 if face == 4 else 0.0, light, lit)
+        shade = fade * face_light(nx, nz, 1.0 if face == 4 else 0.0, light, lit)
         haze = (1.0 - fade) * light[HAZE]
         colour = part[ALBEDO] * shade + haze
-        used = _store(polygons, used, quad, 4, ATOP, colour, 0.0, 1.0, camera)
+        used = store(polygons, used, quad, 4, ATOP, colour, 0.0, 1.0, camera)
         if part[PANE] > 0.0 and face < 4:
             mx = 0.25 * (quad[0, 0] + quad[1, 0] + quad[2, 0] + quad[3, 0])
             my = 0.25 * (quad[0, 1] + quad[1, 1] + quad[2, 1] + quad[3, 1])
@@ -249,7 +146,7 @@ def _add_faces(
                 quad[i, 0] += PANE_INSET * (mx - quad[i, 0])
                 quad[i, 1] += PANE_INSET * (my - quad[i, 1])
             colour = part[PANE] * shade + haze
-            used = _store(polygons, used, quad, 4, ATOP, colour, 0.0, 1.0, camera)
+            used = store(polygons, used, quad, 4, ATOP, colour, 0.0, 1.0, camera)
     return used
 
 
@@ -279,12 +176,12 @@ def _add_part(
         ring_px = camera[FOCAL] * part[LOW + 3] / depth
         count = CORNERS
     if part[MODE] == SHADOW:
-        return _store(polygons, used, outline, count, SHADOW, 0.0, 0.0, part[ALBEDO], camera)
-    shade = 0.8 * _face_light(lit[0], lit[1], 0.0, light, lit)
+        return store(polygons, used, outline, count, SHADOW, 0.0, 0.0, part[ALBEDO], camera)
+    shade = 0.8 * face_light(lit[0], lit[1], 0.0, light, lit)
     colour = fade * (part[ALBEDO] * shade + part[EMIT]) + (1.0 - fade) * light[HAZE]
     before = used
     mode = SOLID if part[MODE] == SOLID else ATOP
-    used = _store(polygons, used, outline, count, mode, colour, ring_px, 1.0, camera)
+    used = store(polygons, used, outline, count, mode, colour, ring_px, 1.0, camera)
     if used > before and part[SHAPE] == FRUSTUM and part[PANE] >= 0.0:
         used = _add_faces(polygons, used, part, heading, camera, light, lit, fade)
     return used
@@ -319,7 +216,7 @@ def _add_actor(
     widest = depth * camera[MID_COLUMN] / camera[FOCAL] + 1.5 * REACH_M
     if not -REACH_M < depth < FAR_M or beside > widest:
         return used
-    lit = _local_light(x, z, max(depth, 0.5), camera, light)
+    lit = local_light(x, z, max(depth, 0.5), camera, light)
     fade = light[HAZE_REACH] / (light[HAZE_REACH] + max(depth, 0.0))
     for p in range(len(parts)):
         part = parts[p]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from eqs.scenes import actors as build
 from eqs.scenes.actors import Actor
-from eqs.scenes.outline import (
+from eqs.scenes.light import (
     AMBIENT,
     BEAM,
     HAZE,
@@ -22,7 +22,7 @@ from eqs.scenes.outline import (
     SUN_X,
     SUN_Z,
 )
-from eqs.scenes.render import Surfaces
+from eqs.scenes.paint_street import Surfaces
 from eqs.scenes.textures import (
     HALF_STREET_M,
     KERB_M,

@@ -21,8 +21,10 @@ from eqs.scenes.optics import (
     MID_COLUMN,
     MID_ROW,
 )
-from eqs.scenes.outline import Polygons, outline_actors
-from eqs.scenes.render import COLUMN_FACTS, measure_actors, paint_actors, paint_street
+from eqs.scenes.outline import outline_actors
+from eqs.scenes.paint_actors import measure_actors, paint_actors
+from eqs.scenes.paint_street import COLUMN_FACTS, paint_street
+from eqs.scenes.polygons import Polygons
 
 FIELD_OF_VIEW_RAD = np.deg2rad(44.0)
 

@@ -3,8 +3,8 @@ import pytest
 
 from eqs.scenes.actors import SOLID
 from eqs.scenes.optics import convex_hull, coverage, project, set_edges, signed_area
-from eqs.scenes.outline import EDGES, JOIN, X0, X1, Y0, Y1, Polygons
-from eqs.scenes.render import _paint_actor
+from eqs.scenes.paint_actors import _paint_actor
+from eqs.scenes.polygons import EDGES, JOIN, X0, X1, Y0, Y1, Polygons
 
 
 def camera(**change):
