@@ -1,4 +1,4 @@
-"""Small files that are whole or not there: JSON records and hashes of what they describe."""
+"""Small files: JSON records that are whole or not there, hashes, lists of whole numbers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import hashlib
 import json
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 def write_json(path: Path, content: object) -> None:
@@ -46,3 +49,20 @@ def file_sha256(path: Path) -> str:
     """Digest of a file's content, as 64 hex digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def whole_numbers(path: Path) -> NDArray[np.int64]:
+    """The numbers of a text file, one row per line that is not a comment.
+
+    Raises:
+        ValueError: the file holds something else, or rows of different lengths.
+    """
+    try:
+        lines = [line for line in path.read_text().splitlines() if line.strip()]
+        rows = [line.split(",") for line in lines if not line.lstrip().startswith("#")]
+        return np.array([[int(number) for number in row] for row in rows], np.int64)
+    except (ValueError, OverflowError) as error:  # no text, no number, too large, or rows uneven
+        raise ValueError(
+            f"Expected whole microseconds in {path}, got a file that says otherwise ({error}); "
+            "write one row a line"
+        ) from error

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from eqs.files import whole_numbers
 from eqs.frames import read_image
 
 EVENTS = Path("events/left/events.h5")
@@ -144,7 +145,7 @@ def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
                 "add the time of each frame in microseconds, one a line"
             )
         return np.empty(0, np.int64)
-    times_us = _whole_numbers(path).reshape(-1)
+    times_us = whole_numbers(path).reshape(-1)
     if frames == 1 or len(times_us) == 1:
         raise ValueError(
             f"Expected at least two frames in {folder}, got one; a single frame moves nothing"
@@ -162,24 +163,11 @@ def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
     return times_us
 
 
-def _whole_numbers(path: Path) -> NDArray[np.int64]:
-    """The numbers of a text file, one row per line that is not a comment."""
-    try:
-        lines = [line for line in path.read_text().splitlines() if line.strip()]
-        rows = [line.split(",") for line in lines if not line.lstrip().startswith("#")]
-        return np.array([[int(number) for number in row] for row in rows], np.int64)
-    except (ValueError, OverflowError) as error:  # no text, no number, too large, or rows uneven
-        raise ValueError(
-            f"Expected whole microseconds in {path}, got a file that says otherwise ({error}); "
-            "write one row a line"
-        ) from error
-
-
 def _exposures(folder: Path, frames: int) -> NDArray[np.int64] | None:
     path = folder / EXPOSURES
     if not path.exists():
         return None
-    exposures_us = _whole_numbers(path)
+    exposures_us = whole_numbers(path)
     if exposures_us.shape != (frames, 2):
         raise ValueError(
             f"Expected start and end of {frames} exposures in {path}, got numbers of shape "

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import multiprocessing
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.progress import track
 
 from eqs.data.recording import Recording
@@ -112,22 +115,8 @@ class SimulatedEvents:
     def simulate(self, recording: Recording) -> None:
         """Write one recording's events and the manifest that says what they are."""
         path = self.path(recording)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        stream = self.simulator.start(recording.name)
         frames = FrameFolder(recording.frame_folder, recording.frame_times_us)
-        with EventWriter(
-            path,
-            height=recording.height,
-            width=recording.width,
-            t_offset_us=int(recording.frame_times_us[0]),
-        ) as writer:
-            count = 0
-            for images, times_us in frames:
-                events = stream.step(images, times_us)
-                writer.append(events)
-                count += len(events)
-            rest = stream.finish()
-            writer.append(rest)
+        _, events = write_stream(self.simulator, recording.name, frames, path)
         write_json(
             self._manifest_path(recording),
             {
@@ -137,7 +126,7 @@ class SimulatedEvents:
                 "recording": recording.name,
                 "frames": frame_fingerprint(recording),
                 "frames_sha256": short_hash([file_sha256(file) for file in recording.frame_paths]),
-                "events": count + len(rest),
+                "events": events,
             },
         )
 
@@ -158,6 +147,47 @@ class SimulatedEvents:
             frame_fingerprint(recording),
         )
         return (stored["parameters"], stored["version"], stored["frames"]) == expected
+
+
+def write_stream(
+    simulator: Simulator,
+    name: str,
+    clip: Iterable[tuple[NDArray[Any], NDArray[np.int64]]],
+    path: Path,
+    follow: Callable[[int, int], None] = lambda frames, events: None,
+) -> tuple[int, int]:
+    """Write the events of a clip, chunk by chunk, in memory that does not grow with its length.
+
+    Args:
+        simulator: what makes events from frames.
+        name: names the stream to the simulator, whose randomness depends on it.
+        clip: chunks of frames with their times in microseconds.
+        path: DSEC event file to write, whose times count from the first frame.
+        follow: told the numbers of frames and events after each chunk.
+
+    Returns:
+        Numbers of frames and events.
+
+    Raises:
+        ValueError: the clip has no frame.
+    """
+    chunks = iter(clip)
+    first = next(chunks, None)
+    if first is None:
+        raise ValueError(f"Expected frames to simulate {path} from, got none; give a longer clip")
+    stream = simulator.start(name)
+    height, width = first[0].shape[1:3]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    frames = count = 0
+    with EventWriter(path, height, width, t_offset_us=int(first[1][0])) as writer:
+        for images, times_us in itertools.chain([first], chunks):
+            events = stream.step(images, times_us)
+            writer.append(events)
+            frames, count = frames + len(images), count + len(events)
+            follow(frames, count)
+        rest = stream.finish()
+        writer.append(rest)
+    return frames, count + len(rest)
 
 
 def frame_fingerprint(recording: Recording) -> str:

@@ -152,8 +152,8 @@ class ConvLSTM(nn.Module):
     def start_open(self) -> None:
         """Begin as a squashing function of the input: its own candidates, let in and out.
 
-        With the usual random weights a tenth of the signal passes each of the four stages, and a
-        short training spends its first hundreds of steps on opening the way.
+        With the usual random weights half-closed gates and mixed candidates weaken the signal in
+        each of the four stages, and a short training begins with opening the way.
         """
         weight, bias = self.conv1x1.weight.flatten(1), cast(Tensor, self.conv1x1.bias)
         gates, size = 3 * self.channels, self.channels

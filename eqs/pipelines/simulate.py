@@ -11,8 +11,8 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from eqs.events import EventWriter
-from eqs.files import read_json, write_json
+from eqs.data.simulated import write_stream
+from eqs.files import read_json, whole_numbers, write_json
 from eqs.frames import FrameFolder, VideoFile, image_paths
 from eqs.pipelines.command import explained
 from eqs.simulators import Simulator
@@ -73,7 +73,7 @@ def open_clip(source: Path, frames_per_second: float | None) -> FrameFolder | Vi
         return VideoFile(source)
     files = [folder / TIMES for folder in (source, source.parent) if (folder / TIMES).is_file()]
     if files and frames_per_second is None:
-        return FrameFolder(source, read_times(files[0]))
+        return FrameFolder(source, whole_numbers(files[0]).reshape(-1))
     if frames_per_second is None or not frames_per_second > 0:
         raise ValueError(
             f"Expected {TIMES} in {source} or beside it, or a frame rate above zero, got "
@@ -84,28 +84,8 @@ def open_clip(source: Path, frames_per_second: float | None) -> FrameFolder | Vi
     return FrameFolder(source, np.floor(times).astype(np.int64))
 
 
-def read_times(path: Path) -> np.ndarray:
-    """Whole microseconds, one a line.
-
-    Raises:
-        ValueError: a line holds something else.
-    """
-    try:
-        return np.array([int(line) for line in path.read_text().split()], np.int64)
-    except ValueError as error:
-        raise ValueError(
-            f"Expected whole microseconds in {path}, one a line, got: {error}; correct the file "
-            "or set frames_per_second"
-        ) from error
-
-
 def write_events(simulator: Simulator, clip: FrameFolder | VideoFile, out: Path) -> tuple[int, int]:
-    """Simulate chunk by chunk, in memory that does not grow with the clip; frames and events."""
-    stream = simulator.start(out.stem)
-    chunks = iter(clip)
-    images, times_us = next(chunks, (np.empty((0, 1, 1), np.uint8), np.empty(0, np.int64)))
-    height, width = images.shape[1:3]
-    out.parent.mkdir(parents=True, exist_ok=True)
+    """Simulate a clip while a bar shows how fast; returns the numbers of frames and events."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -113,23 +93,14 @@ def write_events(simulator: Simulator, clip: FrameFolder | VideoFile, out: Path)
         TextColumn("{task.fields[rates]}"),
         TimeRemainingColumn(),
     )
-    offset_us = int(times_us[0]) if len(times_us) else 0
-    frames = count = 0
-    with (
-        EventWriter(out, height, width, t_offset_us=offset_us) as writer,
-        Progress(*columns) as progress,
-    ):
+    with Progress(*columns) as progress:
         task = progress.add_task(simulator.name, total=len(clip) or None, rates="")
-        while len(images):
-            events = stream.step(images, times_us)
-            writer.append(events)
-            frames, count = frames + len(images), count + len(events)
-            so_far = rates(progress.tasks[0].elapsed, frames, count)
-            progress.update(task, advance=len(images), rates=so_far)
-            images, times_us = next(chunks, (images[:0], times_us[:0]))
-        events = stream.finish()
-        writer.append(events)
-    return frames, count + len(events)
+
+        def follow(frames: int, events: int) -> None:
+            so_far = rates(progress.tasks[0].elapsed, frames, events)
+            progress.update(task, completed=frames, rates=so_far)
+
+        return write_stream(simulator, out.stem, clip, out, follow)
 
 
 def rates(seconds: float | None, frames: int, events: int) -> str:
