@@ -19,6 +19,7 @@ ORDER = [
     {"tasks"},
     {"study"},
     {"pipelines"},
+    {"benchmarks"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 MODULES = sorted(ROOT.glob("*/**/*.py"))

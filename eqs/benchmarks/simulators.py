@@ -1,0 +1,106 @@
+"""Time the simulators, on a clip drawn here.
+
+Each simulator runs in a process of its own, once on a corner of the clip to compile, then on the
+whole. Frames are in memory before, events are complete and in order of time after.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from eqs import simulators
+from eqs.benchmarks.timing import peak_mib
+
+NAMES = (
+    "ESIM",
+    "V2E",
+    "PIX2NVS",
+    "Prophesee",
+    "CARLA",
+    "Gazebo",
+    "DVSVoltmeter",
+    "ICNS",
+    "ImprovedESIM",
+)
+THRESHOLDS_LOG = (0.2, 0.02)
+CONTRAST = {"threshold_on_log", "threshold_off_log", "threshold_log"}
+PERIOD_US = 50_000
+
+
+def draw_clip(frames: int, height: int, width: int, seed: int = 0) -> np.ndarray:
+    """A texture with structure at all sizes that drifts by three pixels a frame, uint8."""
+    generator = np.random.default_rng(seed)
+    spectrum = np.fft.rfft2(generator.standard_normal((height, 2 * width)))
+    rate = np.hypot(np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(2 * width)[None])
+    rate[0, 0] = 1.0
+    spectrum /= rate**1.1
+    clip = np.empty((frames, height, width), np.uint8)
+    drift = np.exp(-2j * np.pi * np.fft.rfftfreq(2 * width) * 3.0)
+    low = high = None
+    for index in range(frames):
+        picture = np.fft.irfft2(spectrum * drift**index, s=(height, 2 * width))[:, :width]
+        if low is None or high is None:
+            low, high = picture.min(), picture.max()
+        clip[index] = np.clip(30.0 + 200.0 * (picture - low) / (high - low), 0, 255)
+    return clip
+
+
+def has_threshold(name: str) -> bool:
+    """Whether the simulator has a contrast threshold to set; other models have other parameters."""
+    return bool(CONTRAST & {field.name for field in fields(getattr(simulators, name))})
+
+
+def configured(name: str, threshold_log: float) -> Any:  # noqa: ANN401 - one of many classes
+    """The simulator with all its mean thresholds at one value, if it has such, else as it is."""
+    kind = getattr(simulators, name)
+    names = {field.name for field in fields(kind)}
+    values = dict.fromkeys(CONTRAST & names, threshold_log)
+    if "threshold_min_log" in names:
+        values["threshold_min_log"] = threshold_log
+    return kind(**values)
+
+
+def measure(job: tuple[str, float, tuple[int, int, int]]) -> tuple[int, float, float]:
+    """Events, seconds and MiB of memory beyond clip and program."""
+    name, threshold_log, shape = job
+    simulator = configured(name, threshold_log)
+    clip, times_us = draw_clip(*shape), PERIOD_US * np.arange(shape[0])
+    run(simulator, clip[:4, :32, :32], times_us[:4])
+    before = peak_mib()
+    start = time.perf_counter()
+    events = run(simulator, clip, times_us)
+    seconds = time.perf_counter() - start
+    return events, seconds, peak_mib() - before
+
+
+def run(simulator: simulators.Simulator, clip: np.ndarray, times_us: np.ndarray) -> int:
+    """Number of events of a clip, simulated in chunks as a study does."""
+    stream = simulator.start("benchmark")
+    chunks = range(0, len(clip), 8)
+    count = sum(len(stream.step(clip[k : k + 8], times_us[k : k + 8])) for k in chunks)
+    return count + len(stream.finish())
+
+
+def print_table(frames: int, width: int, height: int, names: Sequence[str] = NAMES) -> None:
+    """One row per simulator and threshold."""
+    table = Table(title=f"{frames} frames of {width}x{height}")
+    for column in ("simulator", "threshold", "Mevents", "Mevents/s", "frames/s", "peak MiB"):
+        table.add_column(column, justify="left" if column == "simulator" else "right")
+    context = multiprocessing.get_context("spawn")
+    for name in names:
+        for threshold_log in THRESHOLDS_LOG[: None if has_threshold(name) else 1]:
+            with context.Pool(1) as pool:  # a fresh process: memory peaks do not mix
+                found = pool.apply(measure, ((name, threshold_log, (frames, height, width)),))
+            events, seconds, memory = found
+            row = (events / 1e6, events / 1e6 / seconds, frames / seconds, memory)
+            shown = str(threshold_log) if has_threshold(name) else "its own"
+            table.add_row(name, shown, *(f"{value:.1f}" for value in row))
+    Console().print(table)
