@@ -50,6 +50,8 @@ class RVTDetector(nn.Module):
         layer_scale_init: factor that every attention and MLP branch starts with; the published one
             is close to nothing, a larger one lets a short training use the branches at once.
         open_recurrence: start every recurrent cell so that it passes its input on.
+        first_box_strides: width and height, in strides, of the boxes that every anchor starts
+            with; None starts as published.
 
     Raises:
         ValueError: an unknown size, or weights that do not fit.
@@ -73,6 +75,7 @@ class RVTDetector(nn.Module):
         new_class_branch: bool = False,
         layer_scale_init: float = LAYER_SCALE_INIT,
         open_recurrence: bool = False,
+        first_box_strides: tuple[float, float] | None = None,
     ) -> None:
         """Build the network, then load `weights` if there are any."""
         super().__init__()
@@ -100,6 +103,8 @@ class RVTDetector(nn.Module):
                 nn.init.constant_(module.gamma, layer_scale_init)
             elif isinstance(module, ConvLSTM) and open_recurrence:
                 module.start_open()
+        if first_box_strides is not None:
+            self.yolox_head.start_from(first_box_strides)
         if weights is not None:
             load_weights(self, weights, new_class_branch=new_class_branch)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -31,6 +32,18 @@ class YOLOXHead(nn.Module):
         self.stems = nn.ModuleList(ConvNormAct(channels, width) for channels in widths)
         for layer in (*self.cls_preds, *self.obj_preds):
             nn.init.constant_(layer.bias, -math.log((1 - PRIOR) / PRIOR))
+
+    @torch.no_grad()
+    def start_from(self, box_strides: tuple[float, float]) -> None:
+        """Begin with boxes of this width and height, in strides, in the middle of their cells.
+
+        With biases of zero they begin as squares of one stride around a corner of the cell, and
+        most of a small object's first candidates hardly overlap it.
+        """
+        width, height = box_strides
+        for layer in self.reg_preds:
+            start = torch.tensor([0.5, 0.5, math.log(width), math.log(height)])
+            cast(Tensor, layer.bias).copy_(start)
 
     def forward(self, levels: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
         """Predict for every anchor of every level.

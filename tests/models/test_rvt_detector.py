@@ -98,9 +98,19 @@ def test_configurations_build_their_size(size):
     config = OmegaConf.load(CONFIGS / f"rvt_{size}.yaml")
     # These come from other groups of the whole configuration.
     config.num_classes, config.partition_split_32, config.layer_scale_init = 3, 2, 0.1
-    config.in_channels, config.open_recurrence = 20, True
+    config.in_channels, config.open_recurrence, config.first_box_strides = 20, True, [2.0, 3.0]
     model = instantiate(config)
     assert (model.size, model.num_classes, model.backbone.multiple) == (size, 3, 64)
     gammas = [value for name, value in model.named_parameters() if name.endswith("gamma")]
     assert len(gammas) == 16
     assert all((gamma == 0.1).all() for gamma in gammas)
+
+
+@torch.no_grad()
+def test_first_boxes_have_the_size_asked_for():
+    torch.manual_seed(0)
+    model = RVTDetector("tiny", first_box_strides=(2.0, 3.0)).eval()
+    boxes = model(torch.zeros(1, 20, 64, 64))[0][0, :64]
+    expected = torch.tensor([[4.0, 4.0], [12.0, 4.0], [20.0, 4.0]])
+    torch.testing.assert_close(boxes[:3, :2], expected, atol=1.0, rtol=0)
+    torch.testing.assert_close(boxes[:, 2:4].mean(0), torch.tensor([16.0, 24.0]), atol=1.5, rtol=0)
