@@ -5,6 +5,7 @@ from eqs.models.detector import SIZES, RVTDetector
 from eqs.models.loss import detection_loss
 from eqs.models.postprocess import Detections, postprocess
 from eqs.models.states import States, detach_states, gather_frames, reset_states
+from eqs.models.synchronised import SyncBatchNorm
 
 __all__ = [
     "SIZES",
@@ -13,6 +14,7 @@ __all__ = [
     "RVTBackbone",
     "RVTDetector",
     "States",
+    "SyncBatchNorm",
     "detach_states",
     "detection_loss",
     "gather_frames",

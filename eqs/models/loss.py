@@ -7,6 +7,7 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, one_hot
 
 from eqs.models.assignment import Assignment, assign
+from eqs.models.synchronised import mean_over_processes
 
 IOU_WEIGHT = 5.0
 
@@ -19,6 +20,9 @@ def detection_loss(
     offsets: Tensor | None = None,
 ) -> dict[str, Tensor]:
     """Loss of F frames, summed over all and divided by the number of foreground anchors.
+
+    Where several processes train together, each divides by their mean number: the mean of their
+    losses, and of their gradients, is then that of one process with all the frames.
 
     Args:
         boxes: decoded boxes (F, A, 4), cx, cy, w, h in pixels, float32.
@@ -35,7 +39,8 @@ def detection_loss(
     object, not a count.
     """
     found = assign(boxes.detach(), logits.detach(), anchors, labels)
-    count = max(len(found.frame), 1)
+    foreground = logits.new_tensor(len(found.frame))
+    count = mean_over_processes(foreground).clamp(min=1)
     target = labels[found.frame, found.row]
     iou_loss = _iou_loss(boxes[found.frame, found.anchor], target[:, 1:]) * IOU_WEIGHT / count
     objectness = torch.zeros_like(logits[..., 0])
@@ -53,7 +58,7 @@ def detection_loss(
         "conf_loss": conf_loss,
         "cls_loss": cls_loss,
         "l1_loss": l1_loss,
-        "num_fg": count / objects,
+        "num_fg": foreground.clamp(min=1) / objects,
     }
 
 
