@@ -160,7 +160,7 @@ def truck(paint: float, box: float, *, length: float = 6.8, lit: bool) -> NDArra
             (0.0, -0.9, wide + 0.03, half - 0.9, 0.75),
             (0.0, -0.9, wide + 0.03, half - 0.9, 3.1),
             box,
-            pane=0.8 * box,
+            pane=0.3 * box,  # painted sides
         ),
         *_wheels((-0.55 * half, 0.68 * half), wide + 0.04, 0.42),
         *_lamps(half, 0.8, 0.75, 0.18, FRONT, 90.0 if lit else 0.0, 0.85),

@@ -22,7 +22,7 @@ from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.world import DrivingWorld
 
-VERSION: Final = 9  # raise it whenever the same parameters give other files
+VERSION: Final = 10  # raise it whenever the same parameters give other files
 FRAME_PERIOD_US: Final = 50_000
 LEAD_IN_US: Final = 60_000  # events before the first frame
 LEAD_OUT_US: Final = 10_000  # and after the last one
@@ -197,7 +197,7 @@ class DSECMini:
 
     size: str = "128x96"
     sequences: Mapping[str, int] = field(
-        default_factory=lambda: {"train": 48, "val": 4, "test": 10}
+        default_factory=lambda: {"train": 88, "val": 4, "test": 10}
     )
     frames: int = 60
     seed: int = 0

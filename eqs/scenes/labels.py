@@ -28,7 +28,7 @@ TRACK_DTYPE: Final = np.dtype(
 
 @dataclass(frozen=True, kw_only=True)
 class LabelRule:
-    """Which actors in sight get a box; the default width is six columns of a 128x96 image.
+    """Which actors in sight get a box; the default width is five columns of a 128x96 image.
 
     Args:
         smallest_width: least width of a clipped box, as a share of the image's.
@@ -37,7 +37,7 @@ class LabelRule:
         least_inside: least share of the box that lies inside the image.
     """
 
-    smallest_width: float = 30 / 640
+    smallest_width: float = 25 / 640
     smallest_height: float = 20 / 480
     least_visible: float = 0.5
     least_inside: float = 0.4

@@ -37,6 +37,7 @@ LANE_M: Final = 1.9
 PARKING_M: Final = 5.1
 EYE_M: Final = 1.5
 PEDESTRIAN, RIDER, CAR, TRUCK = 0, 1, 2, 4  # DSEC-Detection class ids
+TRUCK_SHARE: Final = 0.06  # of the vehicles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,11 +95,11 @@ def _waves(rng: np.random.Generator, *, sway: float, shake: float) -> NDArray[np
 
 def draw_drive(rng: np.random.Generator, *, still: bool) -> Drive:
     """A drive along the right lane; a `still` one waits with the engine running."""
-    speed = 0.0 if still else rng.uniform(3.0, 8.0)
+    speed = 0.0 if still else rng.uniform(2.0, 5.0)
     return Drive(
         speed=speed,
         x=LANE_M + rng.uniform(-0.3, 0.3),
-        waves=_waves(rng, sway=0.12 if still else 1.0, shake=0.5 if still else 1.0),
+        waves=_waves(rng, sway=0.12 if still else 1.0, shake=0.2 if still else 1.0),
         yaw=rng.uniform(-0.06, 0.06),
     )
 
@@ -148,7 +149,7 @@ def draw_surfaces(
     left, left_roofs = front(rng, lighting, -1.0, texel_m)
     right, right_roofs = front(rng, lighting, 1.0, texel_m)
     road = ground(rng, lighting, texel_m, (left_roofs, right_roofs))
-    sky = lighting.ambient_lux * (0.02 if night else rng.uniform(0.7, 1.3))
+    sky = lighting.ambient_lux * (0.15 if night else rng.uniform(0.7, 1.3))
     roofs = np.zeros((len(left_roofs) + 1, 2))
     roofs[1:] = np.cumsum(np.stack([left_roofs, right_roofs], axis=1), axis=0) / texel_m
     contrast = 0.05 if night else rng.uniform(0.05, 0.2)
@@ -171,17 +172,18 @@ def _paint(rng: np.random.Generator, *, dark: float = 0.04, bright: float = 0.8)
 
 
 def _car(rng: np.random.Generator, *, lit: bool) -> NDArray[np.float64]:
+    paint = _paint(rng)
     return build.car(
-        _paint(rng),
+        paint,
         length=rng.uniform(3.9, 4.8),
         height=rng.uniform(1.42, 1.85),
-        glass=float(rng.choice([0.03, 0.06, 0.3])),
+        glass=0.04 if paint > 0.2 else rng.uniform(0.3, 0.5),  # bright glass mirrors the sky
         lit=lit,
     )
 
 
 def _truck(rng: np.random.Generator, *, lit: bool) -> NDArray[np.float64]:
-    return build.truck(_paint(rng), rng.uniform(0.25, 0.8), length=rng.uniform(5.8, 8.0), lit=lit)
+    return build.truck(_paint(rng), rng.uniform(0.55, 0.8), length=rng.uniform(5.8, 8.0), lit=lit)
 
 
 def _pedestrian(rng: np.random.Generator, *, gait: float) -> NDArray[np.float64]:
@@ -236,66 +238,67 @@ def draw_vehicles(
 ) -> list[Actor]:
     """Parked, leading and oncoming cars and trucks."""
     found = []
+
+    def add(x: float, z: float, *, speed: float = 0.0, heading: float = 0.0, lit: bool) -> None:
+        heavy = rng.random() < TRUCK_SHARE
+        parts = _truck(rng, lit=lit) if heavy else _car(rng, lit=lit)
+        label = TRUCK if heavy else CAR
+        found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=label, parts=parts))
+
     for side, heading in ((1.0, 0.0), (-1.0, np.pi)):
-        share, z = rng.uniform(0.02, 0.2), rng.uniform(2.0, 10.0)
-        while z < way_m + 18.0:
+        share, z = rng.uniform(0.03, 0.25), rng.uniform(2.0, 10.0)
+        while z < way_m + 13.0:
             if rng.random() < share:
-                heavy = rng.random() < 0.08
-                parts = _truck(rng, lit=False) if heavy else _car(rng, lit=False)
-                x = side * (PARKING_M + rng.uniform(-0.12, 0.12))
-                label = TRUCK if heavy else CAR
-                found.append(Actor(x=x, z=z, heading=heading, label=label, parts=parts))
+                add(side * (PARKING_M + rng.uniform(-0.12, 0.12)), z, heading=heading, lit=False)
             z += 8.6 if rng.random() < share else 6.2
     if rng.random() < 0.25:
-        heavy = rng.random() < 0.1
-        parts = _truck(rng, lit=night) if heavy else _car(rng, lit=night)
-        speed = max(0.0, drive.speed + rng.choice([-1.0, 1.0]) * rng.uniform(1.0, 2.5))
-        label = TRUCK if heavy else CAR
-        found.append(
-            Actor(x=drive.x, z=rng.uniform(9.0, 24.0), speed=speed, label=label, parts=parts)
-        )
-    z = rng.uniform(12.0, 34.0)
+        speed = max(0.0, drive.speed + rng.choice([-1.0, 1.0]) * rng.uniform(0.7, 1.5))
+        add(drive.x, rng.uniform(8.0, 15.0), speed=speed, lit=night)
+    z = rng.uniform(10.0, 28.0)
     for _ in range(rng.integers(0, 3)):
-        heavy = rng.random() < 0.12
-        parts = _truck(rng, lit=night) if heavy else _car(rng, lit=night)
-        x, label = -LANE_M + rng.uniform(-0.2, 0.2), TRUCK if heavy else CAR
-        found.append(Actor(x=x, z=z, speed=8.0, heading=np.pi, label=label, parts=parts))
-        z += rng.uniform(9.0, 35.0)
+        add(-LANE_M + rng.uniform(-0.2, 0.2), z, speed=6.0, heading=np.pi, lit=night)
+        z += rng.uniform(9.0, 30.0)
     return found
 
 
-def draw_people(
-    rng: np.random.Generator, drive: Drive, way_m: float, *, night: bool
-) -> list[Actor]:
-    """Pedestrians on the pavements and crossing, and cyclists."""
+def _ahead(rng: np.random.Generator, way_m: float) -> float:
+    """Somewhere along the way, or little beyond: farther people show, but too small for a box."""
+    return rng.uniform(5.0, way_m + 9.0)
+
+
+def draw_pedestrians(rng: np.random.Generator, way_m: float) -> list[Actor]:
+    """People on the pavements, beside parked cars and crossing the street."""
     found = []
+
+    def add(x: float, speed: float, heading: float) -> None:
+        parts, z = _pedestrian(rng, gait=speed * 4.6), _ahead(rng, way_m)
+        found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=PEDESTRIAN, parts=parts))
+
     for _ in range(rng.integers(1, 4)):
         walking = rng.random() < 0.8
-        speed = rng.uniform(1.0, 1.8) if walking else 0.0
-        heading = float(rng.choice([0.0, np.pi])) + rng.uniform(-0.1, 0.1)
         beside = rng.random() < 0.4  # on the road beside the parked cars
         x = rng.uniform(3.6, 4.2) if beside else rng.uniform(KERB_M + 0.3, HALF_STREET_M - 0.8)
-        x *= rng.choice([-1.0, 1.0])
-        z = rng.uniform(5.0, way_m + 8.0)
-        parts = _pedestrian(rng, gait=speed * 4.6)
-        found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=PEDESTRIAN, parts=parts))
+        heading = float(rng.choice([0.0, np.pi])) + rng.uniform(-0.8, 0.8)
+        add(x * rng.choice([-1.0, 1.0]), rng.uniform(1.0, 1.8) if walking else 0.0, heading)
     for _ in range(rng.integers(0, 3)):
-        side, speed = rng.choice([-1.0, 1.0]), rng.uniform(1.0, 1.9)
-        x, z = side * rng.uniform(1.0, KERB_M), way_m + rng.uniform(4.0, 10.0)
-        parts = _pedestrian(rng, gait=speed * 4.6)
-        found.append(
-            Actor(x=x, z=z, speed=speed, heading=-side * np.pi / 2, label=PEDESTRIAN, parts=parts)
-        )
+        side = rng.choice([-1.0, 1.0])
+        add(side * rng.uniform(1.0, KERB_M), rng.uniform(1.0, 1.9), -side * np.pi / 2)
+    return found
+
+
+def draw_cyclists(rng: np.random.Generator, way_m: float, *, night: bool) -> list[Actor]:
+    """Cyclists who cross the street: seen from ahead they would look like pedestrians."""
+    found = []
     for _ in range(rng.integers(1, 4)):
-        speed, kind = rng.uniform(3.0, 6.5), rng.random()
-        parts = _cyclist(rng, lit=night)
-        if kind < 0.25:
-            x, z, heading = rng.uniform(3.1, 3.9), rng.uniform(5.0, 0.7 * way_m + 7.0), 0.0
-        elif kind < 0.4:
-            x, z, heading = -rng.uniform(2.4, 3.4), rng.uniform(10.0, way_m + 20.0), np.pi
-        else:
-            heading = float(rng.choice([-1.0, 1.0])) * np.pi / 2
-            x = -np.sign(heading) * rng.uniform(2.0, 12.0)
-            z = way_m * rng.uniform(0.3, 1.0) + rng.uniform(5.0, 10.0)
-        found.append(Actor(x=x, z=z, speed=speed, heading=heading, label=RIDER, parts=parts))
+        side = float(rng.choice([-1.0, 1.0]))
+        found.append(
+            Actor(
+                x=-side * rng.uniform(0.0, 10.0),
+                z=_ahead(rng, way_m),
+                speed=rng.uniform(2.0, 5.0),
+                heading=side * (0.5 * np.pi + rng.uniform(-0.6, 0.6)),
+                label=RIDER,
+                parts=_cyclist(rng, lit=night),
+            )
+        )
     return found

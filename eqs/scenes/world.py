@@ -91,7 +91,8 @@ class DrivingWorld:
         self.actors = [
             *street.draw_furniture(rng, way_m + 80.0, night=night),
             *street.draw_vehicles(rng, self._drive, way_m, night=night),
-            *street.draw_people(rng, self._drive, way_m, night=night),
+            *street.draw_pedestrians(rng, way_m),
+            *street.draw_cyclists(rng, way_m, night=night),
         ]
         self._rows = np.array([actor.row() for actor in self.actors])
         self._parts = np.concatenate([actor.parts for actor in self.actors])

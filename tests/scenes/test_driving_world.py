@@ -66,12 +66,12 @@ def test_ten_times_finer_steps_change_about_ten_times_less(world):
 
 def test_a_still_world_moves_less_than_a_driven_one():
     def activity(still):
-        total = 0.0
-        for seed in range(4):
+        changes = []
+        for seed in range(12):
             world = DrivingWorld(**SIZE, seed=(7, seed), still=still)
             log = np.log([world.radiance(t) for t in (1_000_000, 1_020_000)])
-            total += np.abs(log[1] - log[0]).mean()
-        return total
+            changes.append(np.abs(log[1] - log[0]).mean())
+        return np.median(changes)  # a passer-by near the camera outweighs any shaking
 
     # The engine runs on, so that it still shakes.
     assert activity(still=True) < 0.8 * activity(still=False)
@@ -79,7 +79,7 @@ def test_a_still_world_moves_less_than_a_driven_one():
 
 def test_boxes_bound_the_visible_pixels():
     seen = 0
-    for seed in range(5):
+    for seed in range(10):
         world = DrivingWorld(height=96, width=128, seed=(5, seed))
         view = world.view(1_200_000)
         for box, track in zip(view.boxes, view.tracks, strict=True):
@@ -119,13 +119,16 @@ def test_visible_shares_are_shares_and_some_actors_are_hidden():
     assert 0.1 < (shares < 0.9).mean() < 0.9
 
 
-def test_every_class_appears_and_tracks_keep_their_class(world):
-    classes = {}
-    for t in range(0, 3_000_000, 300_000):
-        view = world.view(t)
-        for track, label in zip(view.tracks, view.labels, strict=True):
-            assert classes.setdefault(int(track), int(label)) == label
-    assert {0, 1, 2} <= set(classes.values())
+def test_every_class_appears_and_tracks_keep_their_class():
+    found = set()
+    for seed in range(3):
+        world, classes = DrivingWorld(**SIZE, seed=(5, seed)), {}
+        for t in range(0, 3_000_000, 300_000):
+            view = world.view(t)
+            for track, label in zip(view.tracks, view.labels, strict=True):
+                assert classes.setdefault(int(track), int(label)) == label
+        found |= set(classes.values())
+    assert {0, 1, 2} <= found
 
 
 def test_labels_are_clipped_and_large_enough(world):
@@ -149,7 +152,8 @@ def test_label_rule_thresholds_act(world):
     def count(**change):
         return sum(len(LabelRule(**change).boxes(view, 0)) for view in views)
 
-    assert count(smallest_height=0.3) < count() < count(smallest_width=0.0)
+    assert count(smallest_height=0.3) < count()
+    assert count(smallest_width=0.2) < count()
     assert count(least_visible=0.99) < count()
 
 
