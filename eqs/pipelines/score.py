@@ -15,10 +15,12 @@ from rich.progress import track
 from eqs.data import EventSource, Recording, overlap_us
 from eqs.events import EventReader
 from eqs.metrics import score_streams
+from eqs.metrics.baselines import baselines
 from eqs.metrics.corruptions import anchors
 from eqs.pipelines.judge import Judge
+from eqs.study import BASELINE
 
-# Anchors are made in memory, so a long recording lends its first quarter of a minute.
+# Anchors and baselines hold events in memory: a long recording lends its first quarter minute.
 ANCHOR_US = 15_000_000
 
 
@@ -118,6 +120,7 @@ def score_recording(
                 **shared,
                 "eqs": headline.score,
                 **{f"eqs_{reading}": score.score for reading, score in by_reading.items()},
+                **score_baselines(judge, stream, real, start, stop, recording.frame_times_us),
                 "n_windows": headline.n_windows,
                 "n_events_sim": len(stream.window(start, stop)),
             }
@@ -125,6 +128,27 @@ def score_recording(
     scores.anchors += [
         {"sequence": recording.name, "anchor": name, **values} for name, values in known.items()
     ]
+
+
+def score_baselines(
+    judge: Judge,
+    stream: EventReader,
+    real: EventReader,
+    start_us: int,
+    stop_us: int,
+    frame_times_us: NDArray[np.int64],
+) -> dict[str, float]:
+    """What the cheap rivals say of a stream, by column of `eqs.csv`."""
+    stop_us = min(stop_us, start_us + ANCHOR_US)
+    found = baselines(
+        stream.window(start_us, stop_us),
+        real.window(start_us, stop_us),
+        judge.headline.definition,
+        start_us=start_us,
+        stop_us=stop_us,
+        frame_times_us=frame_times_us,
+    )
+    return {f"{BASELINE}{name}": value for name, value in found.items()}
 
 
 def score_anchors(

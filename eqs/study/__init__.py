@@ -24,6 +24,7 @@ from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
 from eqs.study.style import FIGURE_TEXTS, report_figure, save_figure
 from eqs.study.tables import (
+    BASELINE,
     REFERENCE,
     Drops,
     drops,
@@ -38,6 +39,7 @@ from eqs.study.tables import (
 )
 
 __all__ = [
+    "BASELINE",
     "FIGURE_TEXTS",
     "REFERENCE",
     "TARGETS",

@@ -8,9 +8,11 @@ import pandas as pd
 
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.tables import (
+    BASELINE,
     MAP_COLUMNS,
     RATIO_FLOOR,
     REFERENCE,
+    baseline_columns,
     score_columns,
     simulated,
     summarise_eqs,
@@ -115,6 +117,26 @@ def summary_table(eqs: pd.DataFrame) -> Table:
     names = [*score_columns(means), "eqs_chance", "eqs_ceiling", "eqs_scaled", "sequences"]
     names += ["n_events_sim", "n_events_real"]
     return frame_table(means[["system", *names]])
+
+
+def baselines_table(eqs: pd.DataFrame) -> Table:
+    """EQS and every rival per simulator, averaged over sequences; one row per score."""
+    means = summarise_eqs(eqs).set_index("system")
+    names = ["eqs", *baseline_columns(means)]
+    rows = [
+        (
+            name.removeprefix(BASELINE),
+            *(number(float(value)) for value in means[name]),
+            better(name),
+        )
+        for name in names
+    ]
+    return Table(header=("score", *map(str, means.index), "better"), rows=tuple(rows))
+
+
+def better(column: str) -> str:
+    """Which end of a score is the good one, told by its name."""
+    return "lower" if column.endswith(("_error", "_distance")) else "higher"
 
 
 def frame_table(frame: pd.DataFrame) -> Table:

@@ -16,13 +16,20 @@ from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.layout import (
     Table,
     accuracy_table,
+    baselines_table,
     frame_table,
     printed_scores_table,
     scores_table,
     summary_table,
 )
 from eqs.study.printed import ACCURACY_TABLE, SCORES_TABLE
-from eqs.study.tables import RATIO_FLOOR, REFERENCE, summarise_study, write_text
+from eqs.study.tables import (
+    RATIO_FLOOR,
+    REFERENCE,
+    baseline_columns,
+    summarise_study,
+    write_text,
+)
 
 MEDIA_TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 
@@ -113,6 +120,8 @@ def _tables(content: ReportContent) -> dict[str, Table]:
         "summary": summary_table(content.eqs),
         "eqs_rows": frame_table(content.eqs),
     }
+    if baseline_columns(content.eqs):
+        tables["baselines"] = baselines_table(content.eqs)
     if content.study is not None and len(content.study):
         tables["accuracy"] = accuracy_table(summarise_study(content.study))
         tables["study_rows"] = frame_table(content.study)

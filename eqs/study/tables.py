@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 REFERENCE = "real"
 """The system without a simulator: a detector trained on the recorded events themselves."""
 
+BASELINE = "baseline_"
+"""How the columns of EQS's rivals begin."""
+
 RATIO_FLOOR = 0.10
 """Below this simulated mAP a ratio to it rests on too little to be read."""
 
@@ -107,6 +110,11 @@ def score_columns(table: pd.DataFrame) -> list[str]:
     return ["eqs", *(name for name in variants if name.endswith(("_raw", "_centred")))]
 
 
+def baseline_columns(table: pd.DataFrame) -> list[str]:
+    """The columns of EQS's rivals in a table."""
+    return [name for name in table.columns if name.startswith(BASELINE)]
+
+
 def study_table(
     rows: Iterable[Mapping[str, Any]] | pd.DataFrame, scores: pd.DataFrame | None = None
 ) -> pd.DataFrame:
@@ -131,7 +139,7 @@ def study_table(
     table[list(Drops._fields)] = np.array(lost, dtype=float).reshape(-1, 3)
     if scores is not None:
         means = summarise_eqs(scores)
-        joined = [*score_columns(means), "definition", "weights_sha256"]
+        joined = [*score_columns(means), *baseline_columns(means), "definition", "weights_sha256"]
         means = means[["system", *joined]]
         table = table.drop(columns=joined, errors="ignore").merge(means, how="left", on="system")
     table = _complete(table, STUDY_COLUMNS)
@@ -191,7 +199,13 @@ def summarise_eqs(scores: pd.DataFrame) -> pd.DataFrame:
     Convention: `eqs_scaled` follows from the mean score, chance and ceiling.
     """
     groups = scores.groupby("system", sort=False)
-    averaged = [*score_columns(scores), "eqs_distance", "eqs_chance", "eqs_ceiling"]
+    averaged = [
+        *score_columns(scores),
+        *baseline_columns(scores),
+        "eqs_distance",
+        "eqs_chance",
+        "eqs_ceiling",
+    ]
     means = groups[averaged].mean()
     means["eqs_scaled"] = scaled_score(means["eqs"], means["eqs_chance"], means["eqs_ceiling"])
     means["eqs_sd"] = groups["eqs"].std()

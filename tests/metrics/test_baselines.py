@@ -1,0 +1,125 @@
+"""Baselines: what each sees, what it is blind to, and its closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from eqs.events import Events
+from eqs.metrics import corruptions as damage
+from eqs.metrics.baselines import (
+    baselines,
+    chamfer_distance,
+    gaussian_distance,
+    interval_distance,
+    log_rate_error,
+    phase_locking_error,
+    polarity_error,
+    rate_map_correlation,
+    tensor_baselines,
+)
+from eqs.metrics.definition import Definition
+
+FRAMES = np.arange(0, 1_000_001, 50_000)
+WINDOWS = {"start_us": 0, "window_us": 50_000, "windows": 20}
+BEST = {"rate_map_correlation": 1.0, "voxel_ssim": 1.0, "raw_cosine": 1.0, "voxel_psnr": math.inf}
+
+
+@pytest.fixture
+def events(make_events):
+    return make_events(1, count=20_000)
+
+
+def scores(simulated, real):
+    return baselines(
+        simulated, real, Definition(), start_us=0, stop_us=1_000_000, frame_times_us=FRAMES
+    )
+
+
+def stream(t, x=None, p=None, width=8, height=4):
+    columns = [0] * len(t)
+    return Events.from_arrays(
+        t=t, x=x or columns, y=columns, p=p or columns, height=height, width=width
+    )
+
+
+def test_a_stream_is_best_beside_itself(events):
+    found = scores(events, events)
+    for name, value in found.items():
+        assert value == pytest.approx(BEST.get(name, 0.0), abs=1e-6), name
+        assert name in BEST or name.endswith(("_error", "_distance"))
+
+
+def test_thinning_makes_what_counts_worse(events):
+    found = scores(damage.thinned(events, 0.5), events)
+    assert found["log_rate_error"] == pytest.approx(math.log(2), abs=0.05)
+    assert found["interval_distance"] == pytest.approx(math.log10(2), abs=0.1)
+    assert found["polarity_error"] < 0.02
+    for name in BEST:
+        assert found[name] < BEST[name]
+
+
+def test_each_is_blind_to_what_it_does_not_look_at(events):
+    still, moved = scores(events, events), scores(damage.polarity_flipped(events), events)
+    for name in ("log_rate_error", "rate_map_correlation", "interval_distance"):
+        assert moved[name] == still[name]
+    assert moved["polarity_error"] == pytest.approx(abs(1 - 2 * events.p.mean()))
+    assert moved["chamfer_distance"] > still["chamfer_distance"]
+    locked = scores(damage.frame_locked(events, FRAMES), events)
+    assert locked["phase_locking_error"] > 0.9
+    assert locked["rate_map_correlation"] > 0.95
+
+
+def test_rates_by_hand():
+    assert log_rate_error(stream([0, 1, 2]), stream([5])) == pytest.approx(math.log(2))
+    assert polarity_error(stream([0, 1], p=[1, 1]), stream([0, 1, 2, 3], p=[1, 0, 0, 0])) == 0.75
+    assert polarity_error(stream([]), stream([0, 1], p=[1, 0])) == 0
+    assert rate_map_correlation(stream([]), stream([0])) == 0
+
+
+def test_intervals_and_beats_by_hand():
+    slow, fast = stream([0, 1000, 2000]), stream([0, 10, 20])
+    assert interval_distance(slow, fast) == pytest.approx(2)
+    # Two pixels in turn: their own intervals count, not those between neighbours in time.
+    assert interval_distance(stream([0, 5, 1000, 1005], x=[0, 1, 0, 1]), slow) == pytest.approx(0)
+    assert interval_distance(stream([]), stream([0, 1000])) == pytest.approx(0)
+    frames = np.array([0, 100, 300])
+    locked, spread = stream([25, 150]), stream([25, 75, 150, 250])
+    assert phase_locking_error(locked, spread, frames) == pytest.approx(1)
+    assert phase_locking_error(stream([]), spread, frames) == pytest.approx(0)
+
+
+def test_distances_between_points_by_hand():
+    left, right = stream([0], x=[0]), stream([0], x=[7])
+    one = {"start_us": 0, "window_us": 50_000, "windows": 1}
+    assert chamfer_distance(left, right, **one) == pytest.approx(100)
+    assert gaussian_distance(left, right, **one) == pytest.approx(1)
+    assert chamfer_distance(left, left, **one) == gaussian_distance(left, left, **one) == 0
+    assert chamfer_distance(left, right, **WINDOWS) == pytest.approx(100 / 20)
+    assert gaussian_distance(stream([]), right, **one) == pytest.approx(1)
+    # Half a window is 500 scaled units of time.
+    assert chamfer_distance(stream([25_000]), left, **one) == pytest.approx(500)
+
+
+def test_tensor_baselines_by_hand():
+    silence, full = torch.zeros(3, 20, 24, 24), torch.full((3, 20, 24, 24), 10.0)
+    chunk = torch.stack([silence, full], dim=1)
+    found = tensor_baselines([chunk[:2], chunk[2:]], count_cutoff=10)
+    assert found["voxel_psnr"] == pytest.approx(0)
+    assert found["raw_cosine"] == 0
+    assert found["voxel_ssim"] < 0.01
+    half = torch.stack([0.5 * full, full], dim=1)
+    assert tensor_baselines([half], 10)["raw_cosine"] == pytest.approx(1)
+    assert tensor_baselines([half], 10)["voxel_psnr"] == pytest.approx(20 * math.log10(2))
+
+
+@pytest.mark.parametrize("name", ["blank", "poisson"])
+def test_values_are_never_silently_missing(events, name):
+    made = damage.blank(events) if name == "blank" else damage.poisson(events)
+    assert all(np.isfinite(value) for value in scores(made, events).values())
+
+
+def test_other_sensors_are_refused(events):
+    with pytest.raises(ValueError, match="one sensor size"):
+        scores(stream([0], width=3), events)
