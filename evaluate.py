@@ -1,4 +1,4 @@
-"""Tabulate what was trained; with --eqs, also score the simulators and write the report."""
+"""Tabulate what was trained; with --eqs, score the simulators; with --sanity, test the score."""
 
 import sys
 
@@ -6,6 +6,8 @@ import hydra
 from omegaconf import DictConfig
 
 from eqs import pipelines
+
+FLAGS = {"--eqs": "score=true", "--sanity": "sanity=true"}
 
 
 @hydra.main(version_base="1.3", config_path="configs", config_name="evaluate")
@@ -15,6 +17,6 @@ def main(cfg: DictConfig) -> None:
 
 
 if __name__ == "__main__":
-    # Hydra reads only key=value, so the flag is a spelling of one; it may stand anywhere.
-    sys.argv = ["score=true" if argument == "--eqs" else argument for argument in sys.argv]
+    # Hydra reads only key=value, so a flag is a spelling of one; it may stand anywhere.
+    sys.argv = [FLAGS.get(argument, argument) for argument in sys.argv]
     main()

@@ -1,7 +1,7 @@
 """Scores: the Event Quality Score of two streams, and the mean average precision of detections."""
 
+from eqs.metrics.battery import EXPECTED_ORDER, GRADED, anchors, singles
 from eqs.metrics.centre import Centre, feature_centres
-from eqs.metrics.corruptions import anchors
 from eqs.metrics.definition import TAPS, Definition, weights_sha256
 from eqs.metrics.detection import MeanAveragePrecision
 from eqs.metrics.eqs import EventQualityScore, load_backbone
@@ -11,6 +11,8 @@ from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine,
 from eqs.metrics.windows import group_chunks, histogram_chunks, window_starts
 
 __all__ = [
+    "EXPECTED_ORDER",
+    "GRADED",
     "TAPS",
     "Centre",
     "Definition",
@@ -31,6 +33,7 @@ __all__ = [
     "pooled_features",
     "score_group",
     "score_streams",
+    "singles",
     "weights_sha256",
     "window_starts",
 ]

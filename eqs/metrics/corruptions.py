@@ -1,4 +1,4 @@
-"""Damaged copies of a real stream: the anchors that give a score its meaning.
+"""Damaged copies of a real stream, from which a score gets its meaning.
 
 Each function takes events and returns events. Those that draw are keyed by a seed and a name, so
 that the same recording is damaged in the same way in every process.
@@ -10,6 +10,7 @@ import zlib
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from eqs.events import Events
@@ -110,13 +111,7 @@ def poisson(
 
 def with_noise(events: Events, ratio: float = 0.5, *, seed: int = 0, key: str = "") -> Events:
     """The stream and Poisson noise of `ratio` noise events per event."""
-    noise = poisson(events, ratio=ratio, seed=seed, key=key)
-    joined = {
-        name: np.concatenate([getattr(events, name), getattr(noise, name)]) for name in "txyp"
-    }
-    order = np.argsort(joined["t"], kind="stable")
-    fields = {name: values[order] for name, values in joined.items()}
-    return Events(**fields, height=events.height, width=events.width)
+    return _merged(events, poisson(events, ratio=ratio, seed=seed, key=key))
 
 
 def on_clock_of(other: Events, start_us: int, stop_us: int) -> Events:
@@ -133,56 +128,78 @@ def on_clock_of(other: Events, start_us: int, stop_us: int) -> Events:
     return Events.concatenate(parts or [blank(other)]).window(start_us, stop_us)
 
 
-def anchors(
-    real: Events,
-    *,
-    other: Events | None = None,
-    frame_times_us: ArrayLike | None = None,
-    window_us: int = 50_000,
-    start_us: int | None = None,
-    stop_us: int | None = None,
-    seed: int = 0,
-    key: str = "",
-) -> dict[str, Events]:
-    """The streams whose scores tell what a score means, by name.
+def jittered_in_time(events: Events, sigma_us: float, *, seed: int = 0, key: str = "") -> Events:
+    """Every time moved by normal noise, and the stream put in order again."""
+    noise = _generator(seed, "jitter in time", key).normal(0.0, sigma_us, len(events))
+    return _in_order(events, t=events.t + np.rint(noise).astype(np.int64))
 
-    Convention: `ceiling` is the real stream against its own 10 % thinning, `chance` another real
-    recording on the same clock.
 
-    Args:
-        real: real stream, with events.
-        other: another real recording from the same kind of sensor; without it no `chance`.
-        frame_times_us: times of the camera's frames; without them no `frame_locked`.
-        window_us: window of the score, for the shuffle.
-        start_us: start of the first window; by default the first event.
-        stop_us: end of the last window; by default just after the last event.
-        seed: seed of all draws.
-        key: name of the recording.
+def jittered_in_space(events: Events, sigma_px: float, *, seed: int = 0, key: str = "") -> Events:
+    """Every event moved by normal noise in both directions; what leaves the sensor is lost."""
+    noise = _generator(seed, "jitter in space", key).normal(0.0, sigma_px, (2, len(events)))
+    x, y = np.stack([events.x, events.y]) + np.rint(noise).astype(np.int64)
+    inside = np.flatnonzero((x >= 0) & (x < events.width) & (y >= 0) & (y < events.height))
+    moved = {"x": x[inside].astype(np.uint16), "y": y[inside].astype(np.uint16)}
+    return _replace(_select(events, inside), **moved)
 
-    Raises:
-        ValueError: the real stream is empty, or the other one is.
+
+def reversed_in_time(events: Events) -> Events:
+    """The film played backwards between its first and last event: what darkened now brightens."""
+    if not len(events):
+        return events
+    times = (events.t[0] + events.t[-1] - events.t)[::-1]
+    signs = (1 - events.p[::-1]).astype(np.uint8)
+    return _replace(events, t=times, x=events.x[::-1], y=events.y[::-1], p=signs)
+
+
+def with_hot_pixels(
+    events: Events, share: float = 0.001, rate_hz: float = 1000.0, *, seed: int = 0, key: str = ""
+) -> Events:
+    """A share of the pixels, at least one, fire at a constant rate, each with its own phase."""
+    if not len(events):
+        return events
+    generator, pixels = _generator(seed, "hot pixels", key), events.height * events.width
+    hot = generator.choice(pixels, max(1, round(share * pixels)), replace=False)
+    period_us, (first, last) = 1e6 / rate_hz, (int(events.t[0]), int(events.t[-1]))
+    beats = np.arange(max(1, int((last - first) / period_us)))
+    times = first + (generator.random(len(hot))[:, None] + beats) * period_us
+    pixel = np.repeat(hot, len(beats))
+    order = np.argsort(times.ravel(), kind="stable")
+    noise = Events.from_arrays(
+        t=times.ravel()[order].astype(np.int64),
+        x=pixel[order] % events.width,
+        y=pixel[order] // events.width,
+        p=generator.integers(0, 2, len(pixel)),
+        height=events.height,
+        width=events.width,
+    )
+    return _merged(events, noise)
+
+
+def at_double_threshold(events: Events) -> Events:
+    """What pixels would send that fire at every second level.
+
+    A pixel that fires each time its log intensity has moved by C says, event by event, where it
+    is in steps of C; one with a threshold of 2 C fires when it is two steps from its last event.
     """
-    if not len(real):
-        raise ValueError("Expected a real stream with events to make anchors of, got an empty one")
-    start = int(real.t[0]) if start_us is None else start_us
-    stop = int(real.t[-1]) + 1 if stop_us is None else stop_us
-    made = {
-        "identical": real,
-        "ceiling": thinned(real, 0.1, seed=seed, key=key),
-        "thinned_50": thinned(real, 0.5, seed=seed, key=key),
-        "shifted_1px": shifted_in_space(real, columns=1),
-        "shifted_4px": shifted_in_space(real, columns=4),
-        "shuffled": shuffled_in_windows(real, window_us, start_us=start, seed=seed, key=key),
-        "polarity_flipped": polarity_flipped(real),
-        "noise_50": with_noise(real, 0.5, seed=seed, key=key),
-        "poisson": poisson(real, start_us=start, stop_us=stop, seed=seed, key=key),
-        "blank": blank(real),
-    }
-    if frame_times_us is not None:
-        made["frame_locked"] = frame_locked(real, frame_times_us)
-    if other is not None:
-        made["chance"] = on_clock_of(other, start, stop)
-    return made
+    kept = np.zeros(len(events), np.bool_)
+    pixel = events.y.astype(np.int64) * events.width + events.x
+    _every_second_level(pixel, events.p, np.zeros(events.height * events.width, np.int8), kept)
+    return _select(events, np.flatnonzero(kept))
+
+
+@njit(cache=True)
+def _every_second_level(
+    pixel: NDArray[np.int64],
+    p: NDArray[np.uint8],
+    level: NDArray[np.int8],
+    kept: NDArray[np.bool_],
+) -> None:
+    for i in range(len(pixel)):
+        level[pixel[i]] += 1 if p[i] else -1
+        if abs(level[pixel[i]]) == 2:
+            level[pixel[i]] = 0
+            kept[i] = True
 
 
 def _generator(seed: int, name: str, key: str) -> np.random.Generator:
@@ -196,3 +213,16 @@ def _select(events: Events, index: NDArray[np.intp]) -> Events:
 def _replace(events: Events, **fields: NDArray[Any]) -> Events:
     kept = {name: getattr(events, name) for name in "txyp"}
     return Events(**{**kept, **fields}, height=events.height, width=events.width)
+
+
+def _merged(events: Events, others: Events) -> Events:
+    joined = {
+        name: np.concatenate([getattr(events, name), getattr(others, name)]) for name in "txyp"
+    }
+    return _in_order(events, **joined)
+
+
+def _in_order(events: Events, **fields: NDArray[Any]) -> Events:
+    columns = {name: fields.get(name, getattr(events, name)) for name in "txyp"}
+    order = np.argsort(columns["t"], kind="stable")
+    return _replace(events, **{name: column[order] for name, column in columns.items()})

@@ -17,6 +17,7 @@ from eqs.pipelines.command import explained
 from eqs.pipelines.judge import find_judge
 from eqs.pipelines.publish import Findings, publish
 from eqs.pipelines.runs import Run, finished_runs, recipe_hash
+from eqs.pipelines.sanity import sanity
 from eqs.pipelines.score import score_recordings
 from eqs.pipelines.timing import phase_times
 from eqs.study import eqs_table, print_eqs, print_study, study_table, write_table
@@ -28,11 +29,16 @@ log = logging.getLogger(__name__)
 def evaluate(cfg: DictConfig) -> None:
     """Print the mAPs of all finished runs and, with `score`, do the rest of the study.
 
+    With `sanity` the score itself is tested instead, which needs a judge and nothing else.
+
     Raises:
         ValueError: there is neither a finished run nor anything to score.
     """
     console = Console()
     results = Path(cfg.paths.results) / cfg.data.name
+    if cfg.sanity:
+        sanity(cfg, results, console)
+        return
     runs = comparable_runs(cfg)
     if runs:
         study = study_table(study_rows(runs))

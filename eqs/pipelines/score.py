@@ -14,9 +14,8 @@ from rich.progress import track
 
 from eqs.data import EventSource, Recording, overlap_us
 from eqs.events import EventReader
-from eqs.metrics import score_streams
+from eqs.metrics import anchors, score_streams
 from eqs.metrics.baselines import baselines
-from eqs.metrics.corruptions import anchors
 from eqs.pipelines.judge import Judge
 from eqs.study import BASELINE
 

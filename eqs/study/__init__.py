@@ -1,7 +1,7 @@
 """What a study found: tables, statistics, figures and a report. It reads tables, never tensors."""
 
 from eqs.study.answer import answer
-from eqs.study.console import print_eqs, print_study
+from eqs.study.console import print_eqs, print_sanity, print_study
 from eqs.study.correlation import (
     TARGETS,
     Correlation,
@@ -22,6 +22,7 @@ from eqs.study.film import event_picture, event_pictures, with_boxes, write_film
 from eqs.study.pictures import Boxes, detection_panels, event_image, events_panels, score_maps
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
+from eqs.study.sanity import order_faults, sanity_figure, sanity_table, severity_correlations
 from eqs.study.style import FIGURE_TEXTS, report_figure, save_figure
 from eqs.study.tables import (
     BASELINE,
@@ -61,7 +62,9 @@ __all__ = [
     "event_pictures",
     "event_rate",
     "events_panels",
+    "order_faults",
     "print_eqs",
+    "print_sanity",
     "print_study",
     "printed_accuracy",
     "printed_scores",
@@ -69,12 +72,15 @@ __all__ = [
     "read_table",
     "render_report",
     "report_figure",
+    "sanity_figure",
+    "sanity_table",
     "save_figure",
     "scaled_score",
     "score_against_accuracy",
     "score_curve",
     "score_maps",
     "sequence_dots",
+    "severity_correlations",
     "simulated",
     "study_table",
     "summarise_eqs",

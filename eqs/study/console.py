@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import pandas as pd
 from rich.console import Console
 from rich.table import Table as ConsoleTable
 
 from eqs.study.layout import Table, number, scores_table
+from eqs.study.sanity import order_faults, readings, severity_correlations
 from eqs.study.tables import MAP_COLUMNS, Drops, score_columns, summarise_eqs, summarise_study
 
 
@@ -26,6 +29,27 @@ def print_eqs(eqs: pd.DataFrame, console: Console) -> None:
     console.print(_drawn(_chosen(means, names), "Event Quality Score (higher is better)"))
     if variants:
         console.print(_drawn(_chosen(means, ["system", *variants]), "EQS by activation"))
+
+
+def print_sanity(
+    table: pd.DataFrame, headline: str, expected: Sequence[str], console: Console
+) -> None:
+    """Print what every reading makes of the damaged streams, and where it disagrees."""
+    names = [headline, *(name for name in readings(table) if name != headline)]
+    rows = tuple(
+        (
+            str(row["corruption"]) + ("" if pd.isna(row["severity"]) else f" {row['severity']:g}"),
+            *(number(row[name]) for name in names),
+        )
+        for row in table.to_dict("records")
+    )
+    console.print(_drawn(Table(header=("corruption", *names), rows=rows), "Sanity battery"))
+    for name in names:
+        faults = order_faults(table, name, expected)
+        verdict = "as expected" if not faults else "not as expected, " + ", ".join(faults)
+        console.print(f"[bold]{name}[/bold]: order {verdict}")
+        ranks = severity_correlations(table, name).items()
+        console.print("  Spearman of severity: " + "; ".join(f"{k} {v:.2f}" for k, v in ranks))
 
 
 def _chosen(frame: pd.DataFrame, names: list[str]) -> Table:

@@ -1,10 +1,9 @@
-"""Anchors: what each damage keeps and what it destroys."""
+"""Damaged streams: what each damage keeps and what it destroys."""
 
 import numpy as np
 import pytest
 
 from eqs.events import Events
-from eqs.metrics import anchors
 from eqs.metrics import corruptions as damage
 
 
@@ -104,6 +103,54 @@ def test_other_recording_plays_on_this_clock(make_events):
         damage.on_clock_of(Events.empty(2, 2), 0, 1)
 
 
+def test_jitter_in_time_moves_by_its_sigma_and_keeps_order(events):
+    moved = damage.jittered_in_time(events, 1_000)
+    assert len(moved) == len(events)
+    assert (np.diff(moved.t) >= 0).all()
+    still = damage.jittered_in_time(events, 0.0)
+    assert same(still, events)
+    # Followed by their pixels, which are few, events lie about a sigma from where they were.
+    order = np.argsort(events.t, kind="stable")
+    assert 0.5 < np.abs(np.sort(moved.t) - events.t[order]).mean() < 1_000
+
+
+def test_jitter_in_space_keeps_times_and_loses_the_border(events):
+    moved = damage.jittered_in_space(events, 2.0)
+    assert len(events) > len(moved) > 0.6 * len(events)
+    assert set(moved.t) <= set(events.t)
+    assert same(damage.jittered_in_space(events, 0.0), events)
+
+
+def test_reversal_undoes_itself(events):
+    backwards = damage.reversed_in_time(events)
+    assert (np.diff(backwards.t) >= 0).all()
+    assert (backwards.t[0], backwards.t[-1]) == (events.t[0], events.t[-1])
+    assert backwards.p[0] == 1 - events.p[-1]
+    again = damage.reversed_in_time(backwards)
+    assert np.array_equal(again.t, events.t)
+    assert np.array_equal(again.p, events.p)
+
+
+def test_hot_pixels_fire_at_their_rate(events):
+    noisy = damage.with_hot_pixels(events, share=0.01, rate_hz=500.0)
+    counts = np.bincount(noisy.y.astype(int) * 28 + noisy.x, minlength=560)
+    before = np.bincount(events.y.astype(int) * 28 + events.x, minlength=560)
+    seconds = (events.t[-1] - events.t[0]) / 1e6
+    hot = counts - before
+    assert (hot > 0).sum() == 6  # one percent of 560
+    assert hot[hot > 0] == pytest.approx(500 * seconds, abs=1)
+    assert (np.diff(noisy.t) >= 0).all()
+
+
+def test_doubled_threshold_keeps_every_second_level():
+    # Three up, one down, two up: levels 1 2 3 2 3 4 of C; those of 2 C are at 2 and 4.
+    signs = [1, 1, 1, 0, 1, 1]
+    events = Events.from_arrays(t=range(6), x=[0] * 6, y=[0] * 6, p=signs, height=1, width=2)
+    assert damage.at_double_threshold(events).t.tolist() == [1, 5]
+    ripple = Events.from_arrays(t=range(6), x=[1] * 6, y=[0] * 6, p=[1, 0] * 3, height=1, width=2)
+    assert len(damage.at_double_threshold(ripple)) == 0
+
+
 def test_silence_can_be_damaged(make_events):
     silence = Events.empty(20, 28)
     for damaged in (
@@ -114,18 +161,13 @@ def test_silence_can_be_damaged(make_events):
         damage.shuffled_in_windows(silence),
         damage.poisson(silence),
         damage.with_noise(silence),
+        damage.jittered_in_time(silence, 10),
+        damage.jittered_in_space(silence, 1),
+        damage.reversed_in_time(silence),
+        damage.with_hot_pixels(silence),
+        damage.at_double_threshold(silence),
     ):
         assert len(damaged) == 0
-
-
-def test_table_of_anchors(events, make_events):
-    table = anchors(events, other=make_events(5), frame_times_us=[0, 50_000], key="a")
-    assert {"identical", "ceiling", "chance", "blank", "poisson", "frame_locked"} <= table.keys()
-    assert "chance" not in anchors(events)
-    assert len(table["blank"]) == 0
-    assert len(table["thinned_50"]) < len(table["ceiling"]) < len(table["identical"])
-    with pytest.raises(ValueError, match="real stream with events"):
-        anchors(Events.empty(2, 2))
 
 
 def test_probability_out_of_range_is_refused(events):

@@ -1,0 +1,102 @@
+"""Put the score itself to the test, on real streams that were damaged in known ways."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig
+from rich.console import Console
+from rich.progress import track
+
+from eqs.data import Recording, overlap_us
+from eqs.events import EventReader, Events
+from eqs.metrics import EXPECTED_ORDER, GRADED, score_streams, singles
+from eqs.pipelines.build import dataset
+from eqs.pipelines.judge import Judge, find_judge
+from eqs.pipelines.score import ANCHOR_US
+from eqs.study import print_sanity, sanity_figure, sanity_table, save_figure, write_table
+
+AT_ONCE = 8  # streams of one pass of the judge
+
+
+def sanity(cfg: DictConfig, results: Path, console: Console) -> None:
+    """Score every damaged copy of the test recordings; write `sanity.csv` and its figure.
+
+    Raises:
+        ValueError: there is no judge, or a recording lacks events.
+    """
+    data = dataset(cfg)
+    judge = find_judge(cfg, data)
+    recordings = data.recordings("test")[: cfg.sanity_recordings]
+    rows: list[dict[str, Any]] = []
+    for index, recording in enumerate(track(recordings, description="sanity battery")):
+        other = recordings[(index + 1) % len(recordings)]
+        try:
+            rows += damaged_scores(judge, recording, other, data.crop_rows)
+        except ValueError as error:
+            raise ValueError(f"{recording.name}: {error}") from error
+    table = sanity_table(rows)
+    headline = judge.headline.name
+    write_table(table, results / "sanity.csv")
+    figure = sanity_figure(table, headline, EXPECTED_ORDER)
+    save_figure(figure, results / "figures", "sanity")
+    print_sanity(table, headline, EXPECTED_ORDER, console)
+    console.print(f"[bold]figure[/bold]: {results / 'figures' / 'sanity.png'}")
+
+
+def damaged_scores(
+    judge: Judge, recording: Recording, other: Recording, rows: int | None
+) -> list[dict[str, Any]]:
+    """Scores of every damaged copy of one recording, a column for each reading."""
+    with ExitStack() as stack:
+        real, unrelated = (
+            stack.enter_context(EventReader(each.events_path, each.height, each.width, rows=rows))
+            for each in (recording, other)
+        )
+        start, stop = overlap_us(recording.frame_times_us, real.start_us, real.stop_us)
+        stop = min(stop, start + ANCHOR_US)
+        events = real.window(start, stop)
+        lent = unrelated.window(unrelated.start_us, unrelated.start_us + ANCHOR_US)
+    alike = (lent.height, lent.width) == (events.height, events.width)
+    made = singles(
+        events,
+        other=lent if alike and other is not recording else None,
+        frame_times_us=recording.frame_times_us,
+        window_us=judge.headline.definition.window_us,
+        key=recording.name,
+    )
+    found = []
+    for batch in batches(events, made, recording.name):
+        scores = score_streams(
+            judge.backbone,
+            events,
+            [stream for _, stream in batch],
+            judge.readings,
+            start_us=start,
+            stop_us=stop,
+        )
+        for (named, _), by_reading in zip(batch, scores, strict=True):
+            values = {reading: score.score for reading, score in by_reading.items()}
+            found.append({"sequence": recording.name, **named, **values})
+    return found
+
+
+def batches(
+    events: Events, made: dict[str, Events], key: str
+) -> Iterator[list[tuple[dict[str, Any], Events]]]:
+    """The streams with what they are called, a few at a time; graded ones are made when needed."""
+    everything = itertools.chain(
+        ((names(name, None), stream) for name, stream in made.items()),
+        ((names(g.family, g.severity), g.apply(events, key=key)) for g in GRADED),
+    )
+    while batch := list(itertools.islice(everything, AT_ONCE)):
+        yield batch
+
+
+def names(corruption: str, severity: float | None) -> dict[str, Any]:
+    """The columns that name a stream."""
+    return {"corruption": corruption, "severity": severity}

@@ -1,0 +1,104 @@
+"""What a score makes of streams that were damaged in known ways: table, verdicts, figure."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from eqs.study.statistics import spearman
+from eqs.study.style import STYLE, figure
+
+NAMES = ("sequence", "corruption", "severity")
+
+
+def sanity_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+    """Mean over recordings, one row per corruption and severity; a column for each reading.
+
+    Args:
+        rows: each with `sequence`, `corruption`, `severity` (None for single corruptions) and
+            the score under every reading.
+    """
+    frame = pd.DataFrame(list(rows))
+    frame["severity"] = frame["severity"].astype(float)
+    groups = frame.drop(columns="sequence").groupby(
+        ["corruption", "severity"], sort=False, dropna=False
+    )
+    return groups.mean().reset_index()
+
+
+def readings(table: pd.DataFrame) -> list[str]:
+    """The score columns of a sanity table."""
+    return [name for name in table.columns if name not in NAMES]
+
+
+def order_faults(table: pd.DataFrame, reading: str, expected: Sequence[str]) -> list[str]:
+    """Neighbours of the expected order that a reading puts the wrong way round, as `a < b`.
+
+    Example:
+        >>> rows = [("identical", 1.0), ("chance", 0.2), ("blank", 0.3)]
+        >>> table = pd.DataFrame(
+        ...     [{"corruption": c, "severity": None, "x": v} for c, v in rows]
+        ... )
+        >>> order_faults(table, "x", ["identical", "chance", "blank"])
+        ['chance < blank']
+    """
+    single = table[table["severity"].isna()].set_index("corruption")[reading]
+    known = [name for name in expected if name in single.index]
+    pairs = itertools.pairwise(known)
+    return [f"{a} < {b}" for a, b in pairs if single[a] < single[b]]
+
+
+def severity_correlations(table: pd.DataFrame, reading: str) -> dict[str, float]:
+    """Spearman correlation of severity and score by graded corruption; -1 is best."""
+    graded = table[table["severity"].notna()]
+    found = {}
+    for family, rows in graded.groupby("corruption", sort=False):
+        value = spearman(rows["severity"].to_numpy(float), rows[reading].to_numpy(float))
+        found[str(family)] = np.nan if value is None else value
+    return found
+
+
+def sanity_figure(table: pd.DataFrame, headline: str, expected: Sequence[str]) -> Figure:
+    """Single corruptions as dots, those of the expected order first, and graded ones as curves."""
+    single = table[table["severity"].isna()].set_index("corruption")
+    ordered = [name for name in expected if name in single.index]
+    ordered += [name for name in single.index if name not in ordered]
+    graded = table[table["severity"].notna()]
+    with mpl.rc_context(STYLE):
+        drawing = figure(10, 5.2)
+        left, right = drawing.subplots(1, 2, width_ratios=(1.2, 1))
+        _dots(left, single.loc[ordered], headline, sum(name in expected for name in ordered))
+        for family, rows in graded.groupby("corruption", sort=False):
+            levels = np.arange(1, len(rows) + 1)
+            span = f"{rows['severity'].iloc[0]:g} to {rows['severity'].iloc[-1]:g}"
+            right.plot(levels, rows[headline], marker="o", label=f"{family}: {span}")
+        right.set(xlabel="severity, five levels", ylabel="EQS (higher is better)", ylim=(None, 1))
+        right.legend(fontsize=8)
+    return drawing
+
+
+def _dots(axes: Axes, single: pd.DataFrame, headline: str, ranked: int) -> None:
+    place = np.arange(len(single))[::-1]
+    for name in readings(single.reset_index()):
+        if name != headline:
+            axes.plot(single[name], place, ".", color="#c8c8c8", zorder=1)
+    axes.plot([], [], ".", color="#c8c8c8", label="other readings")
+    axes.plot(single[headline], place, "o", color="#1f4e79", label=headline.replace("_", ", "))
+    axes.axhline(place[ranked - 1] - 0.5, color="#777777", linewidth=0.8)
+    axes.annotate(
+        "expected order, best first",
+        (0.02, place[ranked - 1] - 0.4),
+        xycoords=("axes fraction", "data"),
+        color="#666666",
+        fontsize=8,
+    )
+    axes.set_yticks(place, [str(name).replace("_", " ") for name in single.index])
+    axes.set(xlabel="EQS (higher is better)")
+    axes.legend(loc="lower left", fontsize=8)
