@@ -10,6 +10,7 @@ from eqs.simulators.improved_esim import ImprovedESIM
 from eqs.simulators.pix2nvs import PIX2NVS
 from eqs.simulators.prophesee import Prophesee
 from eqs.simulators.v2e import V2E
+from eqs.simulators.vid2e import Vid2E
 
 __all__ = [
     "CARLA",
@@ -24,4 +25,5 @@ __all__ = [
     "Recorded",
     "Simulator",
     "Stream",
+    "Vid2E",
 ]

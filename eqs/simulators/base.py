@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, NamedTuple, Protocol
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import GreyImage, checked_frames, checked_times
+from eqs.frames import GreyImage, Interpolation, checked_frames, checked_times
 from eqs.simulators.ordering import MAX_PIXELS, MAX_TIME_US, ReorderBuffer, events_of, ordered
 
 MODES = ("fixed", "faithful")
@@ -56,6 +56,7 @@ class Simulator(ABC):
 
     Args:
         mode: `fixed` mends the defects of the published program, `faithful` keeps them.
+        interpolation: makes frames between those of the clip, which the model then sees as well.
 
     Raises:
         ValueError: a parameter lies outside its range.
@@ -68,6 +69,7 @@ class Simulator(ABC):
     """Whether 8-bit colour becomes 8-bit grey, or grey with fractions."""
 
     mode: str = "fixed"
+    interpolation: Interpolation | None = None
 
     def __post_init__(self) -> None:
         """Check the parameters every simulator has."""
@@ -84,8 +86,12 @@ class Simulator(ABC):
         """The pixels after the first frame of a sequence."""
 
     def parameters(self) -> dict[str, Any]:
-        """Everything that changes the events; the seed only where it does."""
+        """Everything that changes the events; seed and interpolation only where they do."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
+        if self.interpolation is None:
+            del values["interpolation"]
+        else:
+            values["interpolation"] = self.interpolation.parameters()
         if not self.stochastic:
             values.pop("seed", None)
         return values
@@ -128,6 +134,7 @@ class Stream:
         self._pixels: Pixels | None = None
         self._buffer = ReorderBuffer()
         self._frames_seen = 0
+        self._last_frame: NDArray[Any] | None = None
         self._origin_us = 0
         self._last_us = 0
         self._size = (0, 0)
@@ -145,8 +152,27 @@ class Stream:
         array = checked_frames(frames)
         times = checked_times(timestamps_us, len(array))
         self._check_continues(array.shape[1:3], times)
-        keys = [self._advance(frame, int(time)) for frame, time in zip(array, times, strict=True)]
+        keys = [
+            self._advance(each, at)
+            for frame, time in zip(array, times, strict=True)
+            for each, at in self._with_those_between(frame, int(time))
+        ]
         return self._events(np.concatenate(keys) if keys else np.empty(0, np.int64))
+
+    def _with_those_between(
+        self, frame: NDArray[Any], time_us: int
+    ) -> Iterator[tuple[NDArray[Any], int]]:
+        """The frames since the last one, where the simulator interpolates, and then the frame."""
+        interpolation, last = self.simulator.interpolation, self._last_frame
+        if interpolation is not None:
+            self._last_frame = frame.copy()
+            between = frame[None][:0] if last is None else interpolation.between(last, frame)
+            span_us, parts = time_us - self._last_us, len(between) + 1
+            for k, made in enumerate(between, start=1):
+                at = time_us - span_us + k * span_us // parts
+                if self._last_us < at < time_us:  # a short interval has no room for all of them
+                    yield made, at
+        yield frame, time_us
 
     def finish(self) -> Events:
         """End the sequence and give the events that were held back.

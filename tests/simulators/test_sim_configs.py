@@ -20,6 +20,7 @@ from eqs.simulators import (
     ImprovedESIM,
     Prophesee,
     Recorded,
+    Vid2E,
 )
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -34,6 +35,7 @@ SIMULATORS = {
     "icns": ICNS,
     "improved_esim": ImprovedESIM,
     "real": Recorded,
+    "vid2e": Vid2E,
 }
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
 
@@ -70,6 +72,8 @@ def test_a_parameter_file_has_exactly_the_defaults(name):
     expected = {field.name: field.default for field in fields(kind)}
     if "seed" in expected:
         expected["seed"] = "${seed}"
+    if "interpolation" in expected:
+        expected["interpolation"] = "${oc.select:interpolation,null}"
     assert values == expected
     assert {key: type(value) for key, value in values.items()} == {
         key: type(value) for key, value in expected.items()

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from eqs.events import Events
+from eqs.frames import LinearInterpolation
 from eqs.simulators import (
     CARLA,
     ESIM,
@@ -21,6 +22,7 @@ from eqs.simulators import (
     ImprovedESIM,
     Prophesee,
     Recorded,
+    Vid2E,
 )
 
 SIMULATORS = [
@@ -47,6 +49,8 @@ SIMULATORS = [
     ImprovedESIM(),
     ImprovedESIM(white_current_fa=20.0, leak_hz=3, threshold_sigma_log=0.03, refractory_us=900),
     ImprovedESIM(mode="faithful", threshold_on_log=0.1, refractory_us=9000, order=2),
+    Vid2E(),
+    V2E(interpolation=LinearInterpolation(factor=3), leak_hz=3, seed=5),
 ]
 SILENT = [
     ESIM(),

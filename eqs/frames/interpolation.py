@@ -1,0 +1,195 @@
+"""Frames between the frames, for simulators that need denser ones than a camera takes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Frame = NDArray[Any]
+
+
+class Interpolation(Protocol):
+    """Makes frames at equal distances between two others."""
+
+    def between(self, first: Frame, second: Frame) -> Frame:
+        """Frames strictly between two, in order, shape (n, *shape of one), n from 0 up.
+
+        Levels run from 0 to 255; the type is that of the frames, whole levels for whole ones.
+        """
+        ...
+
+    def parameters(self) -> dict[str, Any]:
+        """Everything that changes the frames, as plain values."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearInterpolation:
+    """Cross-fades: what moves is shown twice, pale, instead of once in between.
+
+    Args:
+        factor: frames out per frame in.
+
+    Raises:
+        ValueError: the factor is not a whole number from 1 up.
+    """
+
+    factor: int = 10
+
+    def __post_init__(self) -> None:
+        """Check the factor."""
+        require_factor(self.factor)
+
+    def between(self, first: Frame, second: Frame) -> Frame:
+        """See `Interpolation`."""
+        made = [blend(first, second, share) for share in shares(self.factor)]
+        return typed_as(first, made)
+
+    def parameters(self) -> dict[str, Any]:
+        """See `Interpolation`."""
+        return {"kind": "linear", **asdict(self)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkInterpolation:
+    """A network of the user's, for instance Super SloMo, FILM or RIFE.
+
+    Args:
+        network: takes two frames as float arrays (H, W) or (H, W, 3), levels 0 to 255, and the
+            share of the way from the first to the second, and gives the frame there; or the path
+            of a TorchScript file that takes tensors (1, C, H, W), levels 0 to 1, and the share.
+        factor: frames out per frame in.
+        name: what tells this network from others, where it is no file.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the factor is not a whole number from 1 up.
+    """
+
+    network: Callable[[Frame, Frame, float], Frame] | str | Path
+    factor: int = 10
+    name: str = "network"
+
+    def __post_init__(self) -> None:
+        """Check the factor and the file."""
+        require_factor(self.factor)
+        if isinstance(self.network, str | Path) and not Path(self.network).is_file():
+            raise FileNotFoundError(
+                f"Expected a TorchScript file at {self.network}, found none; "
+                "set interpolation.network"
+            )
+
+    def between(self, first: Frame, second: Frame) -> Frame:
+        """See `Interpolation`."""
+        network = self.network
+        if isinstance(network, str | Path):
+            network = scripted(Path(network))
+        pair = first.astype(np.float32), second.astype(np.float32)
+        return typed_as(first, [network(*pair, share) for share in shares(self.factor)])
+
+    def parameters(self) -> dict[str, Any]:
+        """See `Interpolation`."""
+        identity = self.name
+        if isinstance(self.network, str | Path):
+            identity = hashlib.sha256(Path(self.network).read_bytes()).hexdigest()
+        return {"kind": "network", "factor": self.factor, "name": identity}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CachedInterpolation:
+    """Keeps the frames that another interpolation made, by the content of what they lie between.
+
+    Args:
+        inner: makes the frames.
+        folder: where they are kept.
+    """
+
+    inner: Interpolation
+    folder: str | Path
+
+    def between(self, first: Frame, second: Frame) -> Frame:
+        """See `Interpolation`."""
+        digest = hashlib.sha256(json.dumps(self.parameters(), sort_keys=True).encode())
+        for frame in (first, second):
+            digest.update(f"{frame.dtype} {frame.shape}".encode())
+            digest.update(np.ascontiguousarray(frame).tobytes())
+        path = Path(self.folder) / f"{digest.hexdigest()}.npy"
+        if path.is_file():
+            return np.load(path)
+        frames = self.inner.between(first, second)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Several processes may make the same frames; each writes its own file and renames it.
+        partial = path.with_name(f"{path.stem}.{np.random.default_rng().integers(1 << 62)}.partial")
+        with partial.open("wb") as file:
+            np.save(file, frames)
+        partial.replace(path)
+        return frames
+
+    def parameters(self) -> dict[str, Any]:
+        """Those of the inner one: where frames are kept does not change them."""
+        return self.inner.parameters()
+
+
+def require_factor(factor: object) -> None:
+    """Refuse factors that are no whole numbers from 1 up."""
+    if not isinstance(factor, int) or isinstance(factor, bool) or factor < 1:
+        raise ValueError(
+            f"Expected a whole number of frames per frame from 1 up, got {factor!r}; "
+            "set interpolation.factor"
+        )
+
+
+def shares(factor: int) -> list[float]:
+    """Where the frames between two lie, as shares of the way."""
+    return [k / factor for k in range(1, factor)]
+
+
+def blend(first: Frame, second: Frame, share: float) -> NDArray[np.float32]:
+    """The weighted mean of two frames."""
+    return ((1.0 - share) * first + share * second).astype(np.float32)
+
+
+def typed_as(frame: Frame, made: list[Frame]) -> Frame:
+    """Frames in one array of the type of another frame, rounded where that holds whole levels."""
+    if not made:
+        return np.empty((0, *frame.shape), frame.dtype)
+    frames = np.stack(made)
+    if np.issubdtype(frame.dtype, np.integer):
+        frames = np.clip(np.rint(frames), 0, 255)
+    return frames.astype(frame.dtype)
+
+
+def scripted(path: Path) -> Callable[[Frame, Frame, float], Frame]:
+    """A TorchScript file as a function of frames."""
+    import torch  # only those who bring a network need it here
+
+    network = torch.jit.load(str(path), map_location="cpu").eval()
+
+    def tensor(frame: Frame) -> torch.Tensor:
+        channels = frame[None] if frame.ndim == 2 else np.moveaxis(frame, -1, 0)
+        return torch.from_numpy(np.ascontiguousarray(channels))[None] / 255.0
+
+    @torch.inference_mode()
+    def between(first: Frame, second: Frame, share: float) -> Frame:
+        made = 255.0 * network(tensor(first), tensor(second), share)[0].numpy()
+        return made[0] if first.ndim == 2 else np.moveaxis(made, 0, -1)
+
+    return between
+
+
+def displacement_factor(largest_px: float, largest_step_px: float, most: int) -> int:
+    """How many steps a displacement takes if none may be larger than another, at most `most`.
+
+    Example:
+        >>> [displacement_factor(d, 1.0, 64) for d in (0.0, 1.0, 2.5, 900.0)]
+        [1, 1, 3, 64]
+    """
+    return min(max(1, math.ceil(largest_px / largest_step_px)), most)

@@ -1,0 +1,129 @@
+"""Frames between the frames: cross-fades, optical flow, networks, and what is kept on disk."""
+
+import numpy as np
+import pytest
+import torch
+
+from eqs.frames import (
+    CachedInterpolation,
+    FlowInterpolation,
+    LinearInterpolation,
+    NetworkInterpolation,
+)
+from eqs.frames.flow import optical_flow
+
+
+def bar(column, dtype=np.uint8, width=64, height=48):
+    """A smooth bright bar whose middle lies at a column, anywhere between pixels."""
+    profile = 40 + 180 * np.exp(-(((np.arange(width) - column) / 4.0) ** 2))
+    rows = 1 + 0.2 * np.sin(np.arange(height) / 3.0)[:, None]
+    return np.clip(profile * rows, 0, 255).astype(dtype)
+
+
+def middle(frame):
+    """Column of the bar."""
+    weight = np.clip(frame.astype(float).mean(0) - 60, 0, None) ** 2
+    return (weight * np.arange(frame.shape[1])).sum() / weight.sum()
+
+
+def test_cross_fades_are_weighted_means():
+    first, second = np.full((2, 3), 10, np.uint8), np.full((2, 3), 30, np.uint8)
+    made = LinearInterpolation(factor=4).between(first, second)
+    assert made.dtype == np.uint8
+    assert made[:, 0, 0].tolist() == [15, 20, 25]
+    floating = LinearInterpolation(factor=4).between(first / 1.0, second + 0.5)
+    assert floating[:, 0, 0].tolist() == [15.125, 20.25, 25.375]
+    assert LinearInterpolation(factor=1).between(first, second).shape == (0, 2, 3)
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_flow_moves_what_a_cross_fade_doubles(colour):
+    frames = [bar(24.0), bar(32.0)]
+    if colour:
+        frames = [np.stack([frame] * 3, axis=-1) for frame in frames]
+    made = FlowInterpolation(factor=4).between(*frames)
+    assert made.shape == (3, *frames[0].shape)
+    grey = made[..., 0] if colour else made
+    assert [middle(frame) for frame in grey] == pytest.approx([26, 28, 30], abs=0.5)
+    truth = bar(28.0).astype(float)
+    doubled = LinearInterpolation(factor=2).between(bar(24.0), bar(32.0))[0]
+    assert np.abs(grey[1] - truth).mean() < 0.3 * np.abs(doubled - truth).mean()
+
+
+def test_flow_has_the_direction_of_the_motion():
+    flow = optical_flow(bar(24.0), bar(29.0))
+    assert np.median(flow[12:36, 20:29, 0]) == pytest.approx(5, abs=0.5)
+    assert np.abs(np.median(flow[12:36, 20:29, 1])) < 0.5
+
+
+def test_faster_motion_gets_more_frames():
+    still, slow, fast = (
+        len(FlowInterpolation().between(bar(24.0), bar(24.0 + shift))) for shift in (0, 3, 8)
+    )
+    assert still == 0
+    assert 1 <= slow < fast
+    assert len(FlowInterpolation(most_frames=4).between(bar(24.0), bar(32.0))) == 3
+    assert len(FlowInterpolation(factor=6).between(bar(24.0), bar(24.0))) == 5
+
+
+def test_a_network_of_ones_own(tmp_path):
+    given = []
+
+    def network(first, second, share):
+        given.append(share)
+        return (1 - share) * first + share * second
+
+    made = NetworkInterpolation(network=network, factor=4).between(bar(20.0), bar(30.0))
+    assert given == [0.25, 0.5, 0.75]
+    assert np.array_equal(made, LinearInterpolation(factor=4).between(bar(20.0), bar(30.0)))
+
+
+class Fade(torch.nn.Module):
+    def forward(self, first: torch.Tensor, second: torch.Tensor, share: float) -> torch.Tensor:
+        return first * (1.0 - share) + second * share
+
+
+@pytest.mark.filterwarnings("ignore:.*torch.jit:DeprecationWarning")
+@pytest.mark.parametrize("shape", [(5, 6), (5, 6, 3)])
+def test_a_network_in_a_file(tmp_path, shape):
+    path = tmp_path / "fade.pt"
+    torch.jit.script(Fade()).save(str(path))
+    rng = np.random.default_rng(0)
+    first, second = rng.integers(0, 256, (2, *shape), dtype=np.uint8)
+    interpolation = NetworkInterpolation(network=path, factor=3)
+    made = interpolation.between(first, second)
+    expected = LinearInterpolation(factor=3).between(first, second)
+    assert np.abs(made.astype(int) - expected).max() <= 1
+    assert len(interpolation.parameters()["name"]) == 64
+    with pytest.raises(FileNotFoundError, match="TorchScript file"):
+        NetworkInterpolation(network=tmp_path / "none.pt")
+
+
+def test_made_frames_are_kept_by_content(tmp_path):
+    calls = []
+
+    def network(first, second, share):
+        calls.append(share)
+        return first
+
+    def cached(factor=3):
+        inner = NetworkInterpolation(network=network, factor=factor)
+        return CachedInterpolation(inner=inner, folder=tmp_path)
+
+    first = cached().between(bar(20.0), bar(30.0))
+    again = cached().between(bar(20.0), bar(30.0))
+    assert np.array_equal(first, again)
+    assert len(calls) == 2
+    cached().between(bar(20.0), bar(31.0))
+    cached(factor=4).between(bar(20.0), bar(30.0))
+    assert len(calls) == 2 + 2 + 3
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+@pytest.mark.parametrize("kind", [LinearInterpolation, FlowInterpolation])
+@pytest.mark.parametrize("factor", [0, 2.5, True])
+def test_factors_that_make_no_sense_are_refused(kind, factor):
+    with pytest.raises(ValueError, match=r"from 1 up, got .*set interpolation\.factor"):
+        kind(factor=factor)
+    with pytest.raises(ValueError, match="largest_step_px above 0"):
+        FlowInterpolation(largest_step_px=0)
