@@ -13,7 +13,7 @@ from eqs.frames.interpolation import (
     displacement_factor,
     require_factor,
     shares,
-    typed_as,
+    stacked,
 )
 from eqs.frames.luma import luma
 
@@ -76,7 +76,7 @@ class FlowInterpolation:
         made = [
             frame_at(first, second, share, (forward, backward), trust) for share in shares(factor)
         ]
-        return typed_as(first, made)
+        return stacked(first, made)
 
     def parameters(self) -> dict[str, Any]:
         """See `Interpolation`."""

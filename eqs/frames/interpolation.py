@@ -22,7 +22,7 @@ class Interpolation(Protocol):
     def between(self, first: Frame, second: Frame) -> Frame:
         """Frames strictly between two, in order, shape (n, *shape of one), n from 0 up.
 
-        Levels run from 0 to 255; the type is that of the frames, whole levels for whole ones.
+        Levels run from 0 to 255 and keep their fractions, whatever the frames hold.
         """
         ...
 
@@ -50,8 +50,7 @@ class LinearInterpolation:
 
     def between(self, first: Frame, second: Frame) -> Frame:
         """See `Interpolation`."""
-        made = [blend(first, second, share) for share in shares(self.factor)]
-        return typed_as(first, made)
+        return stacked(first, [blend(first, second, share) for share in shares(self.factor)])
 
     def parameters(self) -> dict[str, Any]:
         """See `Interpolation`."""
@@ -93,7 +92,7 @@ class NetworkInterpolation:
         if isinstance(network, str | Path):
             network = scripted(Path(network))
         pair = first.astype(np.float32), second.astype(np.float32)
-        return typed_as(first, [network(*pair, share) for share in shares(self.factor)])
+        return stacked(first, [network(*pair, share) for share in shares(self.factor)])
 
     def parameters(self) -> dict[str, Any]:
         """See `Interpolation`."""
@@ -157,14 +156,10 @@ def blend(first: Frame, second: Frame, share: float) -> NDArray[np.float32]:
     return ((1.0 - share) * first + share * second).astype(np.float32)
 
 
-def typed_as(frame: Frame, made: list[Frame]) -> Frame:
-    """Frames in one array of the type of another frame, rounded where that holds whole levels."""
-    if not made:
-        return np.empty((0, *frame.shape), frame.dtype)
-    frames = np.stack(made)
-    if np.issubdtype(frame.dtype, np.integer):
-        frames = np.clip(np.rint(frames), 0, 255)
-    return frames.astype(frame.dtype)
+def stacked(like: Frame, made: list[Frame]) -> NDArray[np.float32]:
+    """Frames in one array, of levels 0 to 255; `like` tells their shape where there are none."""
+    frames = np.stack(made) if made else np.empty((0, *like.shape))
+    return np.clip(frames, 0, 255).astype(np.float32)
 
 
 def scripted(path: Path) -> Callable[[Frame, Frame, float], Frame]:

@@ -29,7 +29,6 @@ def middle(frame):
 def test_cross_fades_are_weighted_means():
     first, second = np.full((2, 3), 10, np.uint8), np.full((2, 3), 30, np.uint8)
     made = LinearInterpolation(factor=4).between(first, second)
-    assert made.dtype == np.uint8
     assert made[:, 0, 0].tolist() == [15, 20, 25]
     floating = LinearInterpolation(factor=4).between(first / 1.0, second + 0.5)
     assert floating[:, 0, 0].tolist() == [15.125, 20.25, 25.375]
@@ -93,7 +92,7 @@ def test_a_network_in_a_file(tmp_path, shape):
     interpolation = NetworkInterpolation(network=path, factor=3)
     made = interpolation.between(first, second)
     expected = LinearInterpolation(factor=3).between(first, second)
-    assert np.abs(made.astype(int) - expected).max() <= 1
+    assert np.abs(made - expected).max() < 1e-3
     assert len(interpolation.parameters()["name"]) == 64
     with pytest.raises(FileNotFoundError, match="TorchScript file"):
         NetworkInterpolation(network=tmp_path / "none.pt")
