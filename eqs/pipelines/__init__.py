@@ -1,6 +1,7 @@
 """What a command does: configuration to objects to files."""
 
 from eqs.pipelines.detections import detections_over
+from eqs.pipelines.drawing import DetectionPictures
 from eqs.pipelines.evaluate import evaluate
 from eqs.pipelines.prepare import prepare
 from eqs.pipelines.resolvers import register_resolvers
@@ -12,6 +13,7 @@ from eqs.pipelines.train import train
 register_resolvers()
 
 __all__ = [
+    "DetectionPictures",
     "Run",
     "detections_over",
     "evaluate",

@@ -18,7 +18,13 @@ from eqs.study.figures import (
     score_curve,
     sequence_dots,
 )
-from eqs.study.film import event_picture, event_pictures, with_boxes, write_film
+from eqs.study.film import (
+    event_picture,
+    event_pictures,
+    histogram_picture,
+    with_boxes,
+    write_film,
+)
 from eqs.study.pictures import Boxes, detection_panels, event_image, events_panels, score_maps
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
@@ -62,6 +68,7 @@ __all__ = [
     "event_pictures",
     "event_rate",
     "events_panels",
+    "histogram_picture",
     "order_faults",
     "print_eqs",
     "print_sanity",

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw
 
 from eqs.events import EventReader, Events
 from eqs.study.pictures import Boxes, above, box_colour, event_image
+from eqs.study.style import BRIGHTER, DARKER
 
 Picture = NDArray[np.uint8]
 STILLS = 8  # in a strip
@@ -20,6 +21,19 @@ STILLS = 8  # in a strip
 def event_picture(events: Events) -> Picture:
     """The last event of every pixel on white, uint8 (H, W, 3)."""
     return (255 * event_image(events)).round().astype(np.uint8)
+
+
+def histogram_picture(histogram: NDArray[np.integer]) -> Picture:
+    """Pixels with more brighter or more darker events in their colour on white, (H, W, 3).
+
+    Args:
+        histogram: counts (2 * bins, H, W), those of darker events first.
+    """
+    darker, brighter = histogram.reshape(2, -1, *histogram.shape[-2:]).astype(np.int64).sum(1)
+    picture = np.ones((*darker.shape, 3))
+    picture[(darker > 0) & (darker >= brighter)] = to_rgb(DARKER)
+    picture[brighter > darker] = to_rgb(BRIGHTER)
+    return (255 * picture).round().astype(np.uint8)
 
 
 def event_pictures(

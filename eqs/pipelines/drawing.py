@@ -1,0 +1,71 @@
+"""What a detector finds, drawn into the logger while it trains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import cast
+
+import lightning
+import numpy as np
+import torch
+from lightning.pytorch.callbacks import Callback
+from lightning.pytorch.loggers import TensorBoardLogger
+from torch import Tensor
+
+from eqs.data.datasets import Batch
+from eqs.study import Boxes, histogram_picture, with_boxes
+from eqs.tasks import DetectionTask
+
+
+class DetectionPictures(Callback):
+    """After each validation, log a few frames of its first recording with what was found there.
+
+    Args:
+        pictures: how many, evenly spaced.
+        min_score: smallest confidence drawn.
+        zoom: side of the square that a pixel becomes.
+    """
+
+    def __init__(self, pictures: int = 4, min_score: float = 0.3, zoom: int = 3) -> None:
+        """Keep the settings."""
+        self.pictures, self.min_score, self.zoom = pictures, min_score, zoom
+
+    @torch.no_grad()
+    def on_validation_epoch_end(
+        self, trainer: lightning.Trainer, pl_module: lightning.LightningModule
+    ) -> None:
+        """Draw and log, where a TensorBoard logger listens."""
+        boards = [each for each in trainer.loggers if isinstance(each, TensorBoardLogger)]
+        if not boards or not isinstance(pl_module, DetectionTask) or not trainer.is_global_zero:
+            return
+        drawn = np.stack(
+            list(self._drawn(pl_module, cast(Iterable[Batch], trainer.val_dataloaders)))
+        )
+        chosen = np.linspace(0, len(drawn) - 1, min(self.pictures, len(drawn))).round().astype(int)
+        large = drawn[chosen].repeat(self.zoom, axis=1).repeat(self.zoom, axis=2)
+        for board in boards:
+            board.experiment.add_images(
+                "val/detections", large, trainer.global_step, dataformats="NHWC"
+            )
+
+    def _drawn(self, task: DetectionTask, loader: Iterable[Batch]) -> Iterator[np.ndarray]:
+        """Pictures of the labelled frames of the first recording."""
+        for number, batch in enumerate(loader):
+            if number and batch["first"].any():
+                return
+            batch = {name: value.to(task.device) for name, value in batch.items()}
+            histograms = batch["histograms"][batch["labelled"]]
+            for histogram, found in zip(histograms, task.detect(batch), strict=True):
+                yield with_boxes(
+                    histogram_picture(as_numpy(histogram)),
+                    Boxes(**{NAMES[name]: as_numpy(value) for name, value in found.items()}),
+                    min_score=self.min_score,
+                )
+
+
+NAMES = {"boxes": "corners", "labels": "labels", "scores": "scores"}
+
+
+def as_numpy(value: Tensor) -> np.ndarray:
+    """An array on the CPU, half precision as single."""
+    return (value.float() if value.is_floating_point() else value).cpu().numpy()
