@@ -2,5 +2,6 @@
 
 from eqs.representations.histogram import stacked_histogram
 from eqs.representations.mixed_density import mixed_density_stack
+from eqs.representations.soft_histogram import soft_histogram
 
-__all__ = ["mixed_density_stack", "stacked_histogram"]
+__all__ = ["mixed_density_stack", "soft_histogram", "stacked_histogram"]
