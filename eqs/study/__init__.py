@@ -13,6 +13,7 @@ from eqs.study.correlation import (
 from eqs.study.figures import (
     accuracy_bars,
     event_rate,
+    learning_curves,
     rate_curves,
     score_against_accuracy,
     score_curve,
@@ -69,6 +70,7 @@ __all__ = [
     "event_rate",
     "events_panels",
     "histogram_picture",
+    "learning_curves",
     "order_faults",
     "print_eqs",
     "print_sanity",

@@ -287,3 +287,17 @@ def score_curve(
         axes.margins(x=0)
         drawing.legend(loc="outside upper left", ncols=3)
     return drawing
+
+
+def learning_curves(curves: Mapping[str, Sequence[tuple[float, float]]]) -> Figure:
+    """Accuracy over wall time: for each training its points (seconds, mAP in [0, 1])."""
+    with mpl.rc_context(STYLE):
+        drawing = figure(7, 4)
+        axes = drawing.subplots()
+        for at, (name, points) in enumerate(curves.items()):
+            seconds, values = np.array(points, dtype=float).reshape(-1, 2).T
+            axes.plot(seconds / 60, 100 * values, marker=MARKERS[at % len(MARKERS)], label=name)
+        axes.set(xlabel="minutes of training", ylabel="mAP on the validation split")
+        axes.set_ylim(bottom=0)
+        axes.legend(fontsize=8)
+    return drawing
