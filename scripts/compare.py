@@ -30,8 +30,9 @@ def settings(run: Run) -> dict[str, object]:
         else:
             found[path] = value
 
-    config = OmegaConf.to_container(run.config(), resolve=True)
-    walk({name: config[name] for name in SHOWN}, "")
+    config = run.config()
+    for name in SHOWN:
+        walk(OmegaConf.to_container(config[name], resolve=True), name)
     return found
 
 
