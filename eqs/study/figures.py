@@ -52,6 +52,10 @@ def score_against_accuracy(
             axes.margins(x=0.12, y=0.18)
             if column == "map_real":
                 _reference_line(axes, systems)
+        # Names beside the marks would lie on each other where simulators are alike.
+        marks, names = drawing.axes[0].get_legend_handles_labels()
+        if names:
+            drawing.legend(marks, names, loc="outside upper left", ncols=8)
     return drawing
 
 
@@ -73,8 +77,8 @@ def _points(
             color=colour[row["system"]],
             markersize=8,
             capsize=3,
+            label=row["system"],
         )
-        axes.annotate(row["system"], (x, y), xytext=(8, 5), textcoords="offset points")
 
 
 def _anchor_lines(axes: Axes, anchors: pd.Series) -> None:
