@@ -23,6 +23,7 @@ class FaithfulPropheseePixels(PropheseePixels):
     def _begin(self) -> None:
         self.on, self.off = self.on.astype(np.float32), self.off.astype(np.float32)
         self.reference = self.first_filter.astype(np.float64)
+        self.last_us = np.full(self.on.size, -np.inf)
 
     def _fire(
         self,

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.base import Interval
-from eqs.simulators.crossing import fire_levels, firing_pixels
-from eqs.simulators.noise import scatter_noise, shot_events
-from eqs.simulators.ordering import Fired, with_room
+from eqs.simulators.level_memory import LevelMemory
+from eqs.simulators.noise import shot_events
+from eqs.simulators.ordering import Fired
 from eqs.simulators.photoreceptor import MICROSECONDS, filter_share
-from eqs.simulators.randomness import draw_key, uniform_map
+from eqs.simulators.randomness import draw_key
 from eqs.simulators.thresholds import threshold_map
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ class PropheseePixels:
         self.second_filter = self.first_filter.copy()
         self.on: NDArray[Any] = self._thresholds(model.threshold_on_log, "threshold on")
         self.off: NDArray[Any] = self._thresholds(model.threshold_off_log, "threshold off")
-        self.last_us = np.full(image.codes.size, -np.inf)
         self.keys = np.empty(image.codes.size, np.int64)
         self._begin()
 
@@ -44,14 +43,10 @@ class PropheseePixels:
         return np.minimum(drawn, LARGEST_THRESHOLD_LOG) if model.threshold_sigma_log else drawn
 
     def _begin(self) -> None:
-        """Place each pixel somewhere on its way to a leak event."""
-        pixels = self.on.size
-        self.above, self.moved = np.zeros(pixels), np.zeros(pixels)
-        self.chosen = np.empty(pixels + 1, np.int32)
-        self.passed = np.empty(pixels + 1, np.int64)
+        """Nothing has fired, but pixels that leak are somewhere on their way."""
+        self.memory = LevelMemory(self.on, self.off)
         if self.model.leak_hz > 0:
-            key = draw_key(self.model.seed, "leak phase", self.sequence)
-            self.above = self.on * uniform_map(key, pixels)
+            self.memory.start_on_the_way(self.model.seed, self.sequence)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
@@ -74,43 +69,18 @@ class PropheseePixels:
             share,
             self.first_filter,
             self.second_filter,
-            self.above,
-            self.moved,
+            self.memory.above,
+            self.memory.moved,
             self.on,
             model.leak_hz * interval.span_us * MICROSECONDS,
         )
-        chosen, total = firing_pixels(self.moved, self.on, self.off, self.chosen, self.passed)
-        keys = with_room(self.keys, total)
-        count = fire_levels(
-            self.chosen[:chosen],
-            self.passed,
-            self.above,
-            self.moved,
-            self.last_us,
-            self.on,
-            self.off,
-            float(model.refractory_us),
-            False,
-            interval.start_us,
-            interval.span_us,
-            keys,
-        )
-        self.above, self.moved = self.moved, self.above
+        dead_us = float(model.refractory_us)
+        fired = self.memory.fire(interval, dead_us, self.keys, keeps_contrast=False)
         if model.shot_noise_hz == 0:
-            return keys, count
-        return scatter_noise(
-            image.codes,
-            shot,
-            self.above,
-            self.on,
-            self.off,
-            (model.threshold_on_log, model.threshold_off_log),
-            draw_key(model.seed, "shot noise", self.sequence, str(interval.frame)),
-            interval.start_us,
-            interval.span_us,
-            keys,
-            count,
-        )
+            return fired
+        nominal = (model.threshold_on_log, model.threshold_off_log)
+        noise_key = draw_key(model.seed, "shot noise", self.sequence, str(interval.frame))
+        return self.memory.add_noise(interval, image.codes, shot, nominal, noise_key, fired)
 
 
 @njit(cache=True, nogil=True)

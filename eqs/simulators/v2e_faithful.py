@@ -20,8 +20,9 @@ class FaithfulV2EPixels(V2EPixels):
 
     precision: ClassVar[Any] = np.float32
 
-    def _begin(self, on: NDArray[np.float64]) -> None:
-        self.memory = self.filtered.copy()
+    def _begin(self) -> None:
+        self.reference = self.filtered.copy()
+        self.last_us = np.full(self.on.size, -np.inf)
 
     def _fire(
         self,
@@ -38,7 +39,7 @@ class FaithfulV2EPixels(V2EPixels):
             signal,
             share,
             self.filtered,
-            self.memory,
+            self.reference,
             self.on,
             self.off,
             self.leak_per_second,
@@ -50,7 +51,7 @@ class FaithfulV2EPixels(V2EPixels):
         keys, count = _fire_in_rounds(
             passed,
             rounds,
-            self.memory,
+            self.reference,
             self.last_us,
             self.on,
             self.off,
@@ -65,7 +66,7 @@ class FaithfulV2EPixels(V2EPixels):
             codes,
             shot,
             self.filtered,
-            self.memory,
+            self.reference,
             self.on,
             self.off,
             (model.threshold_on_log, model.threshold_off_log),

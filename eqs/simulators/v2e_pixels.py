@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.base import Interval
-from eqs.simulators.crossing import fire_levels, firing_pixels
-from eqs.simulators.noise import scatter_noise, shot_events
-from eqs.simulators.ordering import Fired, with_room
+from eqs.simulators.level_memory import LevelMemory
+from eqs.simulators.noise import shot_events
+from eqs.simulators.ordering import Fired
 from eqs.simulators.photoreceptor import MICROSECONDS, filter_share, lin_log
 from eqs.simulators.randomness import (
     NORMAL_QUANTILES,
     draw_key,
     normal_map,
     normal_quantile,
-    uniform_map,
     word_at,
 )
 from eqs.simulators.thresholds import threshold_map
@@ -44,9 +43,8 @@ class V2EPixels:
         self.leak_per_second = self._stored(self._leaks(on))
         signal = lin_log(image.levels, model.knee_level)
         self.filtered = signal[image.codes].astype(self.precision)
-        self.last_us = np.full(pixels, -np.inf)
         self.keys = np.empty(pixels, np.int64)
-        self._begin(on)
+        self._begin()
 
     def _stored(self, values: NDArray[np.float64]) -> NDArray[Any]:
         if values.strides == (0,):
@@ -60,15 +58,11 @@ class V2EPixels:
         spread = normal_map(draw_key(model.seed, "leak spread"), pixels)
         return model.leak_hz * on * 10.0 ** (model.leak_spread_decades * spread)
 
-    def _begin(self, on: NDArray[np.float64]) -> None:
-        """Place each pixel somewhere on its way to a leak event."""
-        self.moved = np.zeros(on.size)
-        self.chosen = np.empty(on.size + 1, np.int32)
-        self.passed = np.empty(on.size + 1, np.int64)
-        self.above = np.zeros(on.size)
+    def _begin(self) -> None:
+        """Nothing has fired, but pixels that leak are somewhere on their way."""
+        self.memory = LevelMemory(self.on, self.off)
         if self.model.leak_hz > 0:
-            key = draw_key(self.model.seed, "leak phase", self.sequence)
-            self.above = on * uniform_map(key, on.size)
+            self.memory.start_on_the_way(self.model.seed, self.sequence)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
@@ -96,46 +90,20 @@ class V2EPixels:
             signal,
             share,
             self.filtered,
-            self.above,
-            self.moved,
+            self.memory.above,
+            self.memory.moved,
             self.leak_per_second,
             interval.span_us * MICROSECONDS,
             leak_jitter,
             noise_key,
             NORMAL_QUANTILES,
         )
-        chosen, total = firing_pixels(self.moved, self.on, self.off, self.chosen, self.passed)
-        keys = with_room(self.keys, total)
-        count = fire_levels(
-            self.chosen[:chosen],
-            self.passed,
-            self.above,
-            self.moved,
-            self.last_us,
-            self.on,
-            self.off,
-            float(model.refractory_us),
-            True,
-            interval.start_us,
-            interval.span_us,
-            keys,
-        )
-        self.above, self.moved = self.moved, self.above
+        dead_us = float(model.refractory_us)
+        fired = self.memory.fire(interval, dead_us, self.keys, keeps_contrast=True)
         if model.shot_noise_hz == 0:
-            return keys, count
-        return scatter_noise(
-            codes,
-            shot,
-            self.above,
-            self.on,
-            self.off,
-            (model.threshold_on_log, model.threshold_off_log),
-            noise_key,
-            interval.start_us,
-            interval.span_us,
-            keys,
-            count,
-        )
+            return fired
+        nominal = (model.threshold_on_log, model.threshold_off_log)
+        return self.memory.add_noise(interval, codes, shot, nominal, noise_key, fired)
 
 
 @njit(cache=True, nogil=True)
