@@ -1,5 +1,6 @@
 """What a command does: configuration to objects to files."""
 
+from eqs.pipelines.calibrate import calibrate
 from eqs.pipelines.detections import detections_over
 from eqs.pipelines.drawing import DetectionPictures
 from eqs.pipelines.evaluate import evaluate
@@ -15,6 +16,7 @@ register_resolvers()
 __all__ = [
     "DetectionPictures",
     "Run",
+    "calibrate",
     "detections_over",
     "evaluate",
     "prepare",

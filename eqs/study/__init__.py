@@ -1,6 +1,7 @@
 """What a study found: tables, statistics, figures and a report. It reads tables, never tensors."""
 
 from eqs.study.answer import answer
+from eqs.study.calibration import calibration_table, print_calibration
 from eqs.study.console import print_eqs, print_sanity, print_study
 from eqs.study.correlation import (
     TARGETS,
@@ -59,6 +60,7 @@ __all__ = [
     "Target",
     "accuracy_bars",
     "answer",
+    "calibration_table",
     "correlate",
     "correlations",
     "detection_panels",
@@ -72,6 +74,7 @@ __all__ = [
     "histogram_picture",
     "learning_curves",
     "order_faults",
+    "print_calibration",
     "print_eqs",
     "print_sanity",
     "print_study",

@@ -1,0 +1,215 @@
+"""Look for the parameters at which a simulator's events look most like real ones to the judge."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from hydra.utils import instantiate
+from numpy.typing import NDArray
+from omegaconf import DictConfig
+from rich.console import Console
+from rich.progress import Progress
+from scipy import optimize
+
+from eqs.data import Recording, overlap_us
+from eqs.events import EventReader, Events
+from eqs.frames import FrameFolder
+from eqs.metrics import score_streams
+from eqs.metrics.baselines import baselines
+from eqs.pipelines.build import dataset
+from eqs.pipelines.command import explained
+from eqs.pipelines.judge import Judge, find_judge
+from eqs.simulators import Simulator
+from eqs.study import calibration_table, print_calibration, write_table
+
+log = logging.getLogger(__name__)
+FIRST_STEP = 0.7  # of the search, in natural-log units: a factor of two
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """Parameters that share one value, and the bounds of that value."""
+
+    parameters: tuple[str, ...]
+    low: float
+    high: float
+
+
+@dataclass
+class Search:
+    """Scores a simulator on a few recordings and remembers every try.
+
+    Args:
+        judge: what scores.
+        simulator: where the search starts.
+        ranges: what may change.
+        clips: the recordings to tune on.
+        tried: values and scores so far.
+    """
+
+    judge: Judge
+    simulator: Simulator
+    ranges: Sequence[Range]
+    clips: Sequence[Clip]
+    tried: list[dict[str, float]] = field(default_factory=list)
+
+    def at(self, logs: NDArray[np.float64]) -> Simulator:
+        """The simulator with these natural logarithms of its free values, kept in bounds."""
+        changes: dict[str, Any] = {}
+        for each, value in zip(self.ranges, np.exp(logs).tolist(), strict=True):
+            inside = min(max(value, each.low), each.high)
+            changes |= dict.fromkeys(each.parameters, inside)
+        return replace(self.simulator, **changes)
+
+    def start(self) -> NDArray[np.float64]:
+        """Natural logarithms of the values that the simulator has."""
+        return np.log([getattr(self.simulator, each.parameters[0]) for each in self.ranges])
+
+    def miss(self, logs: NDArray[np.float64]) -> float:
+        """One minus the mean score, which the search makes small."""
+        candidate = self.at(logs)
+        score = float(np.mean([clip.score(self.judge, candidate) for clip in self.clips]))
+        values = {e.parameters[0]: getattr(candidate, e.parameters[0]) for e in self.ranges}
+        self.tried.append({**values, "eqs": score})
+        return 1.0 - score
+
+
+@dataclass(frozen=True)
+class Clip:
+    """Frames of a recording and the real events of the same stretch of time."""
+
+    name: str
+    frames: NDArray[Any]
+    times_us: NDArray[np.int64]
+    real: Events
+
+    @classmethod
+    def of(cls, recording: Recording, rows: int | None) -> Clip:
+        """Read a recording into memory."""
+        folder = FrameFolder(recording.frame_folder, recording.frame_times_us)
+        frames = folder.read(0, len(folder))
+        size = recording.height, recording.width
+        with EventReader(recording.events_path, *size, rows=rows) as reader:
+            start, stop = overlap_us(recording.frame_times_us, reader.start_us, reader.stop_us)
+            real = reader.window(start, stop)
+        return cls(recording.name, frames[:, : real.height], recording.frame_times_us, real)
+
+    def simulated(self, simulator: Simulator) -> Events:
+        """What a simulator makes of the frames."""
+        return simulator.simulate(self.frames, self.times_us, self.name)
+
+    def score(self, judge: Judge, simulator: Simulator) -> float:
+        """Headline score of a simulator."""
+        (found,) = score_streams(
+            judge.backbone,
+            self.real,
+            [self.simulated(simulator)],
+            [judge.headline],
+            start_us=int(self.times_us[0]),
+            stop_us=int(self.times_us[-1]),
+        )
+        return found[judge.headline.name].score
+
+    def measures(self, judge: Judge, simulator: Simulator) -> dict[str, float]:
+        """The score, the rate and every baseline."""
+        events = self.simulated(simulator)
+        values = baselines(
+            events,
+            self.real,
+            judge.headline.definition,
+            start_us=int(self.times_us[0]),
+            stop_us=int(self.times_us[-1]),
+            frame_times_us=self.times_us,
+        )
+        ratio = len(events) / max(len(self.real), 1)
+        return {"eqs": self.score(judge, simulator), "events_per_real_event": ratio, **values}
+
+
+@explained
+def calibrate(cfg: DictConfig) -> dict[str, Any]:
+    """Search, report before and after on recordings that the search did not see.
+
+    Returns:
+        The best values by parameter.
+
+    Raises:
+        ValueError: there is nothing to calibrate, or no judge.
+    """
+    simulator, ranges = instantiate(cfg.sim), free_ranges(cfg.search)
+    check(simulator, ranges)
+    data = dataset(cfg)
+    judge = find_judge(cfg, data)
+    train, test = (data.recordings(split) for split in ("train", "test"))
+    clips = [Clip.of(recording, data.crop_rows) for recording in train[: cfg.tune_on]]
+    search = Search(judge, simulator, ranges, clips)
+    best = run(search, cfg.evaluations)
+    measured = {
+        name: [Clip.of(each, data.crop_rows).measures(judge, tuned) for each in test]
+        for name, tuned in (("before", simulator), ("after", best))
+    }
+    console, results = Console(), Path(cfg.paths.results) / cfg.data.name
+    write_table(pd.DataFrame(search.tried), results / f"calibration-{simulator.name}.csv")
+    values = {each.parameters[0]: getattr(best, each.parameters[0]) for each in ranges}
+    before = {name: getattr(simulator, name) for name in values}
+    print_calibration(calibration_table(measured), before, values, console)
+    return values
+
+
+def free_ranges(search: Mapping[str, Any]) -> list[Range]:
+    """The configured ranges."""
+    return [
+        Range(parameters=tuple(each.parameters), low=each.low, high=each.high)
+        for each in search.values()
+    ]
+
+
+def check(simulator: object, ranges: Sequence[Range]) -> None:
+    """Refuse what cannot be searched.
+
+    Raises:
+        ValueError: no simulator, an unknown parameter, or bounds that leave out where it starts.
+    """
+    if not isinstance(simulator, Simulator):
+        raise ValueError("Expected a simulator to calibrate, got sim=real; set sim=v2e or another")
+    for each in ranges:
+        for name in each.parameters:
+            value = simulator.parameters().get(name)
+            if not isinstance(value, int | float) or not 0 < each.low <= value <= each.high:
+                raise ValueError(
+                    f"Expected {simulator.name} to have a {name} between {each.low} and "
+                    f"{each.high}, got {value!r}; set search, or sim.{name} for another start"
+                )
+
+
+def run(search: Search, evaluations: int) -> Simulator:
+    """Nelder and Mead's simplex search over logarithms, from the configured values."""
+    start = search.start()
+    simplex = np.vstack([start, start + FIRST_STEP * np.eye(len(start))])
+    outside = simplex > np.log([each.high for each in search.ranges])
+    simplex[outside] -= 2 * FIRST_STEP  # towards the other side
+    with Progress() as progress:
+        task = progress.add_task(f"calibrating {search.simulator.name}", total=evaluations)
+
+        def miss(logs: NDArray[np.float64]) -> float:
+            value = search.miss(logs)
+            progress.advance(task)
+            return value
+
+        found = optimize.minimize(
+            miss,
+            start,
+            method="Nelder-Mead",
+            options={
+                "maxfev": evaluations,
+                "initial_simplex": simplex,
+                "xatol": 0.02,
+                "fatol": 1e-4,
+            },
+        )
+    return search.at(found.x)
