@@ -10,11 +10,10 @@ from eqs.events import Events
 from eqs.metrics import corruptions as damage
 from eqs.metrics.baselines import (
     baselines,
-    chamfer_distance,
-    gaussian_distance,
     interval_distance,
     log_rate_error,
     phase_locking_error,
+    point_baselines,
     polarity_error,
     rate_map_correlation,
     tensor_baselines,
@@ -22,7 +21,6 @@ from eqs.metrics.baselines import (
 from eqs.metrics.definition import Definition
 
 FRAMES = np.arange(0, 1_000_001, 50_000)
-WINDOWS = {"start_us": 0, "window_us": 50_000, "windows": 20}
 BEST = {"rate_map_correlation": 1.0, "voxel_ssim": 1.0, "raw_cosine": 1.0, "voxel_psnr": math.inf}
 
 
@@ -92,14 +90,17 @@ def test_intervals_and_beats_by_hand():
 
 def test_distances_between_points_by_hand():
     left, right = stream([0], x=[0]), stream([0], x=[7])
-    one = {"start_us": 0, "window_us": 50_000, "windows": 1}
-    assert chamfer_distance(left, right, **one) == pytest.approx(100)
-    assert gaussian_distance(left, right, **one) == pytest.approx(1)
-    assert chamfer_distance(left, left, **one) == gaussian_distance(left, left, **one) == 0
-    assert chamfer_distance(left, right, **WINDOWS) == pytest.approx(100 / 20)
-    assert gaussian_distance(stream([]), right, **one) == pytest.approx(1)
+
+    def distances(first, second, windows=1):
+        found = point_baselines(first, second, start_us=0, window_us=50_000, windows=windows)
+        return list(found.values())
+
+    assert distances(left, right) == pytest.approx([100, 1])
+    assert distances(left, left) == [0, 0]
+    assert distances(left, right, windows=20) == pytest.approx([100 / 20, 1 / 20])
+    assert distances(stream([]), right)[1] == pytest.approx(1)
     # Half a window is 500 scaled units of time.
-    assert chamfer_distance(stream([25_000]), left, **one) == pytest.approx(500)
+    assert distances(stream([25_000]), left)[0] == pytest.approx(500)
 
 
 def test_tensor_baselines_by_hand():

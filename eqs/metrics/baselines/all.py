@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.metrics.baselines.points import chamfer_distance, gaussian_distance
+from eqs.metrics.baselines.points import point_baselines
 from eqs.metrics.baselines.rates import log_rate_error, polarity_error, rate_map_correlation
 from eqs.metrics.baselines.tensors import tensor_baselines
 from eqs.metrics.baselines.timing import interval_distance, phase_locking_error
@@ -50,10 +50,5 @@ def baselines(
         **tensor_baselines(
             histogram_chunks([simulated, real], starts, definition), definition.count_cutoff
         ),
-        "chamfer_distance": chamfer_distance(
-            simulated, real, start_us=first, window_us=window, windows=len(starts)
-        ),
-        "gaussian_distance": gaussian_distance(
-            simulated, real, start_us=first, window_us=window, windows=len(starts)
-        ),
+        **point_baselines(simulated, real, start_us=first, window_us=window, windows=len(starts)),
     }

@@ -17,25 +17,25 @@ EXTENT = np.array([1000.0, 100.0, 100.0, 100.0])
 FARTHEST = float(np.linalg.norm(EXTENT))
 
 
-def chamfer_distance(
+def point_baselines(
     simulated: Events, real: Events, *, start_us: int, window_us: int, windows: int
-) -> float:
+) -> dict[str, float]:
     """Mean distance to the nearest event of the other stream, both ways, window by window.
+
+    `chamfer_distance` is the mean of the distance d, `gaussian_distance` that of
+    `1 - exp(-d^2 / 0.4)`, where only close neighbours count.
 
     Convention: events are drawn at random where a window holds more than `POINTS`; a silent
     window beside another is as far as the scaled volume is long, two silent ones are equal.
     """
     found = nearest_distances(simulated, real, start_us, window_us, windows)
-    return float(np.mean([0.5 * (there.mean() + back.mean()) for there, back in found]))
-
-
-def gaussian_distance(
-    simulated: Events, real: Events, *, start_us: int, window_us: int, windows: int
-) -> float:
-    """As the Chamfer distance, but of `1 - exp(-d^2 / 0.4)`: only close neighbours count."""
-    found = nearest_distances(simulated, real, start_us, window_us, windows)
-    parts = [[1.0 - np.exp(-(d**2) / 0.4) for d in pair] for pair in found]
-    return float(np.mean([0.5 * (there.mean() + back.mean()) for there, back in parts]))
+    chamfer = [0.5 * (there.mean() + back.mean()) for there, back in found]
+    close = [tuple(1.0 - np.exp(-(d**2) / 0.4) for d in pair) for pair in found]
+    gaussian = [0.5 * (there.mean() + back.mean()) for there, back in close]
+    return {
+        "chamfer_distance": float(np.mean(chamfer)),
+        "gaussian_distance": float(np.mean(gaussian)),
+    }
 
 
 def nearest_distances(
