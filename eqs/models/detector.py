@@ -145,6 +145,14 @@ class RVTDetector(nn.Module):
             new_class_branch=new_class_branch,
         )
 
+    def compile_stages(self, backend: str = "inductor") -> None:
+        """Have `torch.compile` translate every stage of the backbone; parameters keep their names.
+
+        The first steps then take minutes; what it gains depends on the device.
+        """
+        for stage in self.backbone.stages:
+            stage.compile(backend=backend)
+
     def forward(self, x: Tensor, states: States | None = None) -> tuple[Tensor, States]:
         """Detect in one time step.
 

@@ -77,6 +77,8 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
 def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]) -> DetectionTask:
     """The configured detector in its training module."""
     model = instantiate(cfg.model)
+    if cfg.compile:
+        model.compile_stages()
     return instantiate(cfg.task)(model=model, protocol=protocol, test_streams=test_streams)
 
 

@@ -114,3 +114,21 @@ def test_first_boxes_have_the_size_asked_for():
     expected = torch.tensor([[4.0, 4.0], [12.0, 4.0], [20.0, 4.0]])
     torch.testing.assert_close(boxes[:3, :2], expected, atol=1.0, rtol=0)
     torch.testing.assert_close(boxes[:, 2:4].mean(0), torch.tensor([16.0, 24.0]), atol=1.5, rtol=0)
+
+
+def test_compiled_stages_are_the_same_function():
+    torch.manual_seed(0)
+    model = RVTDetector("tiny", partition_split_32=1, layer_scale_init=1.0)
+    x, _ = frames(steps=2, samples=1)
+    names = list(model.state_dict())
+    found = {}
+    for compiled in (False, True):
+        if compiled:
+            model.compile_stages(backend="aot_eager")
+        model.zero_grad()
+        maps, _ = model.backbone.forward_sequence(x)
+        maps[-1].square().sum().backward()
+        weight = model.backbone.stages[0].downsample_cf2cl.conv.weight
+        found[compiled] = maps[-1].detach(), weight.grad.clone()
+    torch.testing.assert_close(found[True], found[False], rtol=1e-4, atol=1e-5)
+    assert list(model.state_dict()) == names
