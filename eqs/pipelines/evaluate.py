@@ -124,7 +124,8 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     console.print(f"[bold]judge[/bold]: {judge.description} ({judge.weights_sha256[:12]})")
     console.print(f"[bold]report[/bold]: {results / 'report.html'}")
     phases = times.read()
-    for phase, seconds in {**phases, "together": sum(phases.values())}.items():
+    # Trainings may have run side by side, so the sum is work, not waiting.
+    for phase, seconds in {**phases, "sum of phases": sum(phases.values())}.items():
         console.print(f"  {phase:<24}{seconds:8.1f} s")
 
 

@@ -57,9 +57,9 @@ class Showcase:
 
 
 def choose(recordings: Sequence[Recording], protocol: LabelProtocol) -> Showcase:
-    """An instant after the first second with many classes, about four boxes, and those large.
+    """An instant after the first second with many classes, and boxes apart, about four, and large.
 
-    More boxes hide each other. Without labels it is the middle of the first recording.
+    Without labels it is the middle of the first recording.
     """
     best = Showcase(recording=recordings[0], index=len(recordings[0].frame_times_us) // 2)
     most: tuple[float, ...] = ()
@@ -74,12 +74,25 @@ def choose(recordings: Sequence[Recording], protocol: LabelProtocol) -> Showcase
             count = len(truth.labels)
             worth = (
                 len(set(truth.labels.tolist())),
+                -touching_pairs(truth.corners),
                 -abs(count - WELCOME_BOXES),
                 sides.prod(1).sum(),
             )
             if worth > most:
                 best, most = shown, worth
     return best
+
+
+def touching_pairs(corners: NDArray[np.floating]) -> int:
+    """How many pairs of boxes (left, top, right, bottom) share some of the picture.
+
+    Example:
+        >>> touching_pairs(np.array([[0, 0, 4, 4], [3, 3, 6, 6], [6, 0, 8, 2]]))
+        1
+    """
+    low = np.maximum(corners[:, None, :2], corners[None, :, :2])
+    high = np.minimum(corners[:, None, 2:], corners[None, :, 2:])
+    return int(np.triu((high > low).all(-1), k=1).sum())
 
 
 def detections(showcase: Showcase, run: Run, protocol: LabelProtocol) -> Boxes:
