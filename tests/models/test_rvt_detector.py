@@ -116,6 +116,8 @@ def test_first_boxes_have_the_size_asked_for():
     torch.testing.assert_close(boxes[:, 2:4].mean(0), torch.tensor([16.0, 24.0]), atol=1.5, rtol=0)
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # PyTorch's compiler warns about itself
 def test_compiled_stages_are_the_same_function():
     torch.manual_seed(0)
     model = RVTDetector("tiny", partition_split_32=1, layer_scale_init=1.0)
@@ -124,7 +126,7 @@ def test_compiled_stages_are_the_same_function():
     found = {}
     for compiled in (False, True):
         if compiled:
-            model.compile_stages(backend="aot_eager")
+            model.compile_stages(backend="eager")
         model.zero_grad()
         maps, _ = model.backbone.forward_sequence(x)
         maps[-1].square().sum().backward()
