@@ -174,7 +174,7 @@ def pedestrian(
 ) -> NDArray[np.float64]:
     """A person on foot; `gait` is the stride's rate in radians per second, zero when standing."""
     k = height / 1.75
-    stride = 0.22 * k if gait > 0.0 else 0.04
+    stride = 0.34 * k if gait > 0.0 else 0.04
     limb, arm = 0.085 * k, 0.06 * k
     rows = [_shadow(0.32, 0.32)]
     for side, offset in ((1.0, 0.0), (-1.0, np.pi)):

@@ -22,7 +22,7 @@ from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.world import DrivingWorld
 
-VERSION: Final = 12  # raise it whenever the same parameters give other files
+VERSION: Final = 11  # raise it whenever the same parameters give other files
 FRAME_PERIOD_US: Final = 50_000
 LEAD_IN_US: Final = 60_000  # events before the first frame
 LEAD_OUT_US: Final = 10_000  # and after the last one

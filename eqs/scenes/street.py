@@ -187,7 +187,7 @@ def _truck(rng: np.random.Generator, *, lit: bool) -> NDArray[np.float64]:
 
 
 def _pedestrian(rng: np.random.Generator, *, gait: float) -> NDArray[np.float64]:
-    coat, trousers = rng.permutation([rng.uniform(0.03, 0.06), rng.uniform(0.55, 0.8)])
+    coat, trousers = rng.permutation([rng.uniform(0.03, 0.07), rng.uniform(0.45, 0.75)])
     return build.pedestrian(
         coat,
         trousers,
