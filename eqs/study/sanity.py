@@ -80,6 +80,7 @@ def sanity_figure(table: pd.DataFrame, headline: str, expected: Sequence[str]) -
             span = f"{rows['severity'].iloc[0]:g} to {rows['severity'].iloc[-1]:g}"
             right.plot(levels, rows[headline], marker="o", label=f"{family}: {span}")
         right.set(xlabel="severity, five levels", ylabel="EQS (higher is better)", ylim=(None, 1))
+        right.set_xticks(range(1, 6))
         right.legend(fontsize=8)
     return drawing
 
@@ -92,13 +93,6 @@ def _dots(axes: Axes, single: pd.DataFrame, headline: str, ranked: int) -> None:
     axes.plot([], [], ".", color="#c8c8c8", label="other readings")
     axes.plot(single[headline], place, "o", color="#1f4e79", label=headline.replace("_", ", "))
     axes.axhline(place[ranked - 1] - 0.5, color="#777777", linewidth=0.8)
-    axes.annotate(
-        "expected order, best first",
-        (0.02, place[ranked - 1] - 0.4),
-        xycoords=("axes fraction", "data"),
-        color="#666666",
-        fontsize=8,
-    )
     axes.set_yticks(place, [str(name).replace("_", " ") for name in single.index])
-    axes.set(xlabel="EQS (higher is better)")
+    axes.set(xlabel="EQS (higher is better)", title="above the line: expected order, best first")
     axes.legend(loc="lower left", fontsize=8)
