@@ -189,7 +189,7 @@ def print_table() -> None:
     for job in LINES:
         plain, fast = best(job)
         table.add_row(*row(job, plain, fast))
-    Console().print(table)
+    Console(width=max(Console().width, 110)).print(table)
 
 
 def row(job: Job, plain: Cost, fast: Cost) -> list[str]:
