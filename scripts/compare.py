@@ -61,7 +61,7 @@ def main() -> None:
         sys.exit(f"Expected finished trainings, got none in {', '.join(unfinished)}")
     every = [settings(run) for run in runs]
     first = every[0]
-    table = Table("differs from the first in", "mAP", "AP50", "minutes")
+    table = Table("training, and where it differs from the first", "mAP", "AP50", "minutes")
     names = []
     for run, own in zip(runs, every, strict=True):
         changed = [
@@ -69,8 +69,8 @@ def main() -> None:
             for name in sorted(own.keys() | first.keys())
             if own.get(name) != first.get(name)
         ]
-        names.append(", ".join(changed) or "first")
         result = run.result()
+        names.append(", ".join([f"{result['system']} seed {result['seed']}", *changed]))
         real = result["real"]
         minutes = f"{result['seconds'] / 60:.1f}"
         table.add_row(names[-1], f"{100 * real['map']:.1f}", f"{100 * real['map_50']:.1f}", minutes)

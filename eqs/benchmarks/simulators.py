@@ -6,7 +6,6 @@ whole. Frames are in memory before, events are complete and in order of time aft
 
 from __future__ import annotations
 
-import multiprocessing
 import time
 from collections.abc import Sequence
 from dataclasses import fields
@@ -17,18 +16,12 @@ from rich.console import Console
 from rich.table import Table
 
 from eqs import simulators
-from eqs.benchmarks.timing import peak_mib
+from eqs.benchmarks.timing import in_own_process, peak_mib
 
-NAMES = (
-    "ESIM",
-    "V2E",
-    "PIX2NVS",
-    "Prophesee",
-    "CARLA",
-    "Gazebo",
-    "DVSVoltmeter",
-    "ICNS",
-    "ImprovedESIM",
+NAMES = tuple(
+    name
+    for name, kind in vars(simulators).items()
+    if isinstance(kind, type) and issubclass(kind, simulators.Simulator) and "name" in vars(kind)
 )
 THRESHOLDS_LOG = (0.2, 0.02)
 CONTRAST = {"threshold_on_log", "threshold_off_log", "threshold_log"}
@@ -94,12 +87,10 @@ def print_table(frames: int, width: int, height: int, names: Sequence[str] = NAM
     table = Table(title=f"{frames} frames of {width}x{height}")
     for column in ("simulator", "threshold", "Mevents", "Mevents/s", "frames/s", "peak MiB"):
         table.add_column(column, justify="left" if column == "simulator" else "right")
-    context = multiprocessing.get_context("spawn")
     for name in names:
         for threshold_log in THRESHOLDS_LOG[: None if has_threshold(name) else 1]:
-            with context.Pool(1) as pool:  # a fresh process: memory peaks do not mix
-                found = pool.apply(measure, ((name, threshold_log, (frames, height, width)),))
-            events, seconds, memory = found
+            job = (name, threshold_log, (frames, height, width))
+            events, seconds, memory = in_own_process(measure, job)
             row = (events / 1e6, events / 1e6 / seconds, frames / seconds, memory)
             shown = str(threshold_log) if has_threshold(name) else "its own"
             table.add_row(name, shown, *(f"{value:.1f}" for value in row))

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 
 class Cost(NamedTuple):
@@ -35,7 +36,7 @@ def time_runs(run: Callable[[], object], least_seconds: float = 2.0, least_runs:
     return Cost(min(seconds), peak_mib() - before)
 
 
-def in_own_process(measure: Callable[[Job], Cost], job: Job) -> Cost:
+def in_own_process(measure: Callable[[Job], Result], job: Job) -> Result:
     """Call `measure(job)` in a fresh process."""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(measure, (job,))

@@ -5,13 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from eqs.files import file_sha256
 
 Frame = NDArray[Any]
 
@@ -98,7 +102,7 @@ class NetworkInterpolation:
         """See `Interpolation`."""
         identity = self.name
         if isinstance(self.network, str | Path):
-            identity = hashlib.sha256(Path(self.network).read_bytes()).hexdigest()
+            identity = network_sha256(Path(self.network))
         return {"kind": "network", "factor": self.factor, "name": identity}
 
 
@@ -126,7 +130,7 @@ class CachedInterpolation:
         frames = self.inner.between(first, second)
         path.parent.mkdir(parents=True, exist_ok=True)
         # Several processes may make the same frames; each writes its own file and renames it.
-        partial = path.with_name(f"{path.stem}.{np.random.default_rng().integers(1 << 62)}.partial")
+        partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
         with partial.open("wb") as file:
             np.save(file, frames)
         partial.replace(path)
@@ -162,8 +166,15 @@ def stacked(like: Frame, made: list[Frame]) -> NDArray[np.float32]:
     return np.clip(frames, 0, 255).astype(np.float32)
 
 
+@lru_cache(maxsize=8)
+def network_sha256(path: Path) -> str:
+    """Digest of a network's file, read once: the cache asks for it with every pair of frames."""
+    return file_sha256(path)
+
+
+@lru_cache(maxsize=2)
 def scripted(path: Path) -> Callable[[Frame, Frame, float], Frame]:
-    """A TorchScript file as a function of frames."""
+    """A TorchScript file as a function of frames, loaded once."""
     import torch  # only those who bring a network need it here
 
     network = torch.jit.load(str(path), map_location="cpu").eval()

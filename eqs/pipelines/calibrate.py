@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -28,7 +27,6 @@ from eqs.pipelines.judge import Judge, find_judge
 from eqs.simulators import Simulator
 from eqs.study import calibration_table, print_calibration, write_table
 
-log = logging.getLogger(__name__)
 FIRST_STEP = 0.7  # of the search, in natural-log units: a factor of two
 
 
@@ -82,12 +80,14 @@ class Search:
 
 @dataclass(frozen=True)
 class Clip:
-    """Frames of a recording and the real events of the same stretch of time."""
+    """Frames of a recording and the real events of the stretch of time that both cover."""
 
     name: str
     frames: NDArray[Any]
     times_us: NDArray[np.int64]
     real: Events
+    start_us: int
+    stop_us: int
 
     @classmethod
     def of(cls, recording: Recording, rows: int | None) -> Clip:
@@ -98,7 +98,8 @@ class Clip:
         with EventReader(recording.events_path, *size, rows=rows) as reader:
             start, stop = overlap_us(recording.frame_times_us, reader.start_us, reader.stop_us)
             real = reader.window(start, stop)
-        return cls(recording.name, frames[:, : real.height], recording.frame_times_us, real)
+        frames = frames[:, : real.height]
+        return cls(recording.name, frames, recording.frame_times_us, real, start, stop)
 
     def simulated(self, simulator: Simulator) -> Events:
         """What a simulator makes of the frames."""
@@ -106,13 +107,17 @@ class Clip:
 
     def score(self, judge: Judge, simulator: Simulator) -> float:
         """Headline score of a simulator."""
+        return self.score_events(judge, self.simulated(simulator))
+
+    def score_events(self, judge: Judge, events: Events) -> float:
+        """Headline score of what a simulator made."""
         (found,) = score_streams(
             judge.backbone,
             self.real,
-            [self.simulated(simulator)],
+            [events],
             [judge.headline],
-            start_us=int(self.times_us[0]),
-            stop_us=int(self.times_us[-1]),
+            start_us=self.start_us,
+            stop_us=self.stop_us,
         )
         return found[judge.headline.name].score
 
@@ -123,12 +128,12 @@ class Clip:
             events,
             self.real,
             judge.headline.definition,
-            start_us=int(self.times_us[0]),
-            stop_us=int(self.times_us[-1]),
+            start_us=self.start_us,
+            stop_us=self.stop_us,
             frame_times_us=self.times_us,
         )
         ratio = len(events) / max(len(self.real), 1)
-        return {"eqs": self.score(judge, simulator), "events_per_real_event": ratio, **values}
+        return {"eqs": self.score_events(judge, events), "events_per_real_event": ratio, **values}
 
 
 @explained
@@ -149,10 +154,11 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     clips = [Clip.of(recording, data.crop_rows) for recording in train[: cfg.tune_on]]
     search = Search(judge, simulator, ranges, clips)
     best = run(search, cfg.evaluations)
-    measured = {
-        name: [Clip.of(each, data.crop_rows).measures(judge, tuned) for each in test]
-        for name, tuned in (("before", simulator), ("after", best))
-    }
+    measured: dict[str, list[dict[str, float]]] = {"before": [], "after": []}
+    for recording in test:
+        clip = Clip.of(recording, data.crop_rows)
+        measured["before"].append(clip.measures(judge, simulator))
+        measured["after"].append(clip.measures(judge, best))
     console, results = Console(), Path(cfg.paths.results) / cfg.data.name
     write_table(pd.DataFrame(search.tried), results / f"calibration-{simulator.name}.csv")
     values = {each.parameters[0]: getattr(best, each.parameters[0]) for each in ranges}

@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from eqs.data import Binning, EvaluationDataset, LabelProtocol, Recording, WindowSource
-from eqs.models import RVTDetector, postprocess
+from eqs.models import Detections, RVTDetector, postprocess
 from eqs.pipelines.runs import Run
 from eqs.study import Boxes
 from eqs.tasks import large_detections
@@ -52,9 +52,13 @@ def detections_over(
             found = postprocess(predictions, min_score)
         if protocol.filter_detections:
             found = [large_detections(each, protocol, recording.width) for each in found]
-        for each in found:
-            yield Boxes(
-                corners=each["boxes"].numpy(),
-                labels=each["labels"].numpy(),
-                scores=each["scores"].numpy(),
-            )
+        yield from map(boxes_of, found)
+
+
+def boxes_of(found: Detections) -> Boxes:
+    """Detections of one frame, from any device and precision, ready to be drawn."""
+    return Boxes(
+        corners=found["boxes"].float().cpu().numpy(),
+        labels=found["labels"].cpu().numpy(),
+        scores=found["scores"].float().cpu().numpy(),
+    )

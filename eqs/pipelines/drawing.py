@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import cast
 
 import lightning
@@ -10,11 +11,13 @@ import numpy as np
 import torch
 from lightning.pytorch.callbacks import Callback
 from lightning.pytorch.loggers import TensorBoardLogger
-from torch import Tensor
 
 from eqs.data.datasets import Batch
-from eqs.study import Boxes, histogram_picture, with_boxes
+from eqs.pipelines.detections import boxes_of
+from eqs.study import histogram_picture, with_boxes
 from eqs.tasks import DetectionTask
+
+CHOICE = 60  # frames to choose from; a whole recording may not fit into memory
 
 
 class DetectionPictures(Callback):
@@ -38,9 +41,8 @@ class DetectionPictures(Callback):
         boards = [each for each in trainer.loggers if isinstance(each, TensorBoardLogger)]
         if not boards or not isinstance(pl_module, DetectionTask) or not trainer.is_global_zero:
             return
-        drawn = np.stack(
-            list(self._drawn(pl_module, cast(Iterable[Batch], trainer.val_dataloaders)))
-        )
+        loader = cast(Iterable[Batch], trainer.val_dataloaders)
+        drawn = np.stack(list(islice(self._drawn(pl_module, loader), CHOICE)))
         chosen = np.linspace(0, len(drawn) - 1, min(self.pictures, len(drawn))).round().astype(int)
         large = drawn[chosen].repeat(self.zoom, axis=1).repeat(self.zoom, axis=2)
         for board in boards:
@@ -57,15 +59,7 @@ class DetectionPictures(Callback):
             histograms = batch["histograms"][batch["labelled"]]
             for histogram, found in zip(histograms, task.detect(batch), strict=True):
                 yield with_boxes(
-                    histogram_picture(as_numpy(histogram)),
-                    Boxes(**{NAMES[name]: as_numpy(value) for name, value in found.items()}),
+                    histogram_picture(histogram.cpu().numpy()),
+                    boxes_of(found),
                     min_score=self.min_score,
                 )
-
-
-NAMES = {"boxes": "corners", "labels": "labels", "scores": "scores"}
-
-
-def as_numpy(value: Tensor) -> np.ndarray:
-    """An array on the CPU, half precision as single."""
-    return (value.float() if value.is_floating_point() else value).cpu().numpy()
