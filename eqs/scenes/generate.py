@@ -196,9 +196,7 @@ class DSECMini:
     """
 
     size: str = "128x96"
-    sequences: Mapping[str, int] = field(
-        default_factory=lambda: {"train": 88, "val": 4, "test": 10}
-    )
+    sequences: Mapping[str, int]
     frames: int = 60
     seed: int = 0
     sensor: ReferenceSensor = field(default_factory=ReferenceSensor)

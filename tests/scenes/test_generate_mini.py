@@ -1,13 +1,16 @@
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from omegaconf import OmegaConf
 from PIL import Image
 
 from eqs.events import EventReader
 from eqs.scenes import DSECMini, Recording
 
+CONFIG = Path(__file__).parents[2] / "configs/data/dsec_mini.yaml"
 TINY = DSECMini(size="32x24", sequences={"train": 2, "test": 1}, frames=4, workers=1)
 
 
@@ -159,22 +162,23 @@ def test_recordings_of_an_earlier_plan_leave(tmp_path):
 
 
 def test_at_least_a_fifth_of_each_split_is_night():
-    for split, count in DSECMini().sequences.items():
-        nights = [r.night for r in DSECMini().recordings() if r.split == split]
+    mini = replace(TINY, sequences=dict(OmegaConf.load(CONFIG).generator.sequences))
+    for split, count in mini.sequences.items():
+        nights = [r.night for r in mini.recordings() if r.split == split]
         assert sum(nights) >= 0.2 * count
 
 
 @pytest.mark.parametrize("size", ["128", "axb", "0x96", "128x"])
 def test_impossible_sizes_are_refused(size):
     with pytest.raises(ValueError, match=r"like 128x96.*set data\.size"):
-        DSECMini(size=size)
+        replace(TINY, size=size)
 
 
 def test_unknown_splits_are_refused():
     with pytest.raises(ValueError, match=r"sequences"):
-        DSECMini(sequences={"training": 3})
+        replace(TINY, sequences={"training": 3})
 
 
 def test_one_frame_is_not_a_recording():
     with pytest.raises(ValueError, match="at least 2 frames, got 1"):
-        DSECMini(frames=1)
+        replace(TINY, frames=1)
