@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,10 @@ from eqs.metrics.definition import Definition
 from eqs.metrics.features import TappedBackbone, pooled_features, strides_of
 from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine
 from eqs.metrics.windows import Stream, group_chunks
+
+Watcher = Callable[[Mapping[str, Sequence[Tensor]]], None]
+"""Sees the pooled features of every window that counts: by tap and stage a map of shape
+(windows, streams, channels, rows, columns), the reference first."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,6 +93,7 @@ def score_group(
     n_windows: int,
     readings: Sequence[Reading],
     *,
+    watch: Watcher | None = None,
     device: torch.device | str = "cpu",
 ) -> list[dict[str, StreamScore]]:
     """Score many streams against one reference, under many readings, in one pass.
@@ -102,6 +107,7 @@ def score_group(
             reference comes first.
         n_windows: windows in all chunks together.
         readings: readings that differ only in tap and centring.
+        watch: sees the same features.
         device: where the backbone lives.
 
     Returns:
@@ -113,9 +119,8 @@ def score_group(
     first = _shared_pass(readings)
     taps = sorted({reading.definition.tap for reading in readings})
     strides = strides_of(backbone, first.stages)
-    totals = {
-        reading.name: _Tally(reading, first.warmup_of(n_windows), strides) for reading in readings
-    }
+    skip = first.warmup_of(n_windows)
+    totals = {reading.name: _Tally(reading, skip, strides) for reading in readings}
     for pooled in pooled_features(
         backbone,
         chunks,
@@ -125,7 +130,11 @@ def score_group(
         device=device,
     ):
         for tally in totals.values():
-            tally.add(pooled[tally.tap])
+            tally.add(pooled[tally.tap], skip)
+        windows = len(pooled[taps[0]][0])
+        if watch is not None and windows > skip:
+            watch({tap: [stage[skip:] for stage in stages] for tap, stages in pooled.items()})
+        skip = max(0, skip - windows)
     by_reading = {name: tally.scores() for name, tally in totals.items()}
     candidates = len(next(iter(by_reading.values())))
     return [
@@ -142,6 +151,7 @@ def score_streams(
     start_us: int | None = None,
     stop_us: int | None = None,
     chunk_windows: int | None = None,
+    watch: Watcher | None = None,
     device: torch.device | str = "cpu",
 ) -> list[dict[str, StreamScore]]:
     """Cut streams into their common windows and score the candidates against the reference.
@@ -154,6 +164,7 @@ def score_streams(
         start_us: start of the first window; by default where all streams have begun.
         stop_us: time that no window may pass; by default where the first stream ends.
         chunk_windows: windows per pass; chosen from the sensor size if None.
+        watch: sees the same features.
         device: where the backbone lives.
 
     Returns:
@@ -169,7 +180,7 @@ def score_streams(
         stop_us=stop_us,
         chunk_windows=chunk_windows,
     )
-    return score_group(backbone, chunks, windows, readings, device=device)
+    return score_group(backbone, chunks, windows, readings, watch=watch, device=device)
 
 
 def _shared_pass(readings: Sequence[Reading]) -> Definition:
@@ -196,24 +207,24 @@ class _Tally:
         self.warmup, self.strides = warmup, strides
         means = reading.centre.for_stages(definition.stages) if reading.centre else None
         self.centres: Sequence[Tensor | None] = means or [None] * len(strides)
-        self.seen = 0
         self.curves: list[Tensor] = []
         self.maps: list[Tensor] | None = None
 
-    def add(self, pooled: Sequence[Tensor]) -> None:
-        """Compare a chunk's streams, by stage (windows, streams, channels, rows, columns)."""
+    def add(self, pooled: Sequence[Tensor], skip: int) -> None:
+        """Compare a chunk's streams, by stage (windows, streams, channels, rows, columns).
+
+        The chunk's first `skip` windows are warm-up and only show in the curve.
+        """
         cosines = [
             patch_cosine(stage[:, 1:], stage[:, :1], centre)
             for stage, centre in zip(pooled, self.centres, strict=True)
         ]
         by_stage = torch.stack([mean_over_stages([cosine]) for cosine in cosines], dim=-1)
         self.curves.append(by_stage.cpu())
-        skip = max(0, self.warmup - self.seen)
         kept = [cosine[skip:].double().sum(dim=0).cpu() for cosine in cosines]
         self.maps = (
             kept if self.maps is None else [a + b for a, b in zip(self.maps, kept, strict=True)]
         )
-        self.seen += len(by_stage)
 
     def scores(self) -> list[StreamScore]:
         """One score per candidate."""
@@ -227,7 +238,7 @@ class _Tally:
                 "checkpoint"
             )
         image = combine_maps(
-            [total / (self.seen - self.warmup) for total in self.maps], self.strides
+            [total / (len(curve) - self.warmup) for total in self.maps], self.strides
         )
         return [
             StreamScore(

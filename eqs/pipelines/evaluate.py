@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,15 +13,16 @@ from omegaconf import DictConfig
 from rich.console import Console
 
 from eqs.data import EventSource
-from eqs.pipelines.build import dataset, event_source
+from eqs.pipelines.build import Dataset, dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import find_judge
 from eqs.pipelines.publish import Findings, publish
+from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import Run, finished_runs, recipe_hash
 from eqs.pipelines.sanity import sanity
 from eqs.pipelines.score import score_recordings
 from eqs.pipelines.timing import phase_times
-from eqs.study import eqs_table, print_eqs, print_study, study_table, write_table
+from eqs.study import BASELINE, eqs_table, print_eqs, print_study, study_table, write_table
 
 log = logging.getLogger(__name__)
 
@@ -108,6 +110,8 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         scores = score_recordings(judge, recordings, systems, data.crop_rows)
     rows = [{"simulator": systems[row["system"]].name, **row} for row in scores.rows]
     table = eqs_table(rows)
+    with times.measure("reverse mAP"):
+        study = with_reverse(study_rows(runs), runs, data, systems)
     names = short_names([(run.result()["simulator"], run.result()["system"]) for run in runs])
     found = Findings(
         recordings=recordings,
@@ -116,7 +120,7 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         runs={names[run.result()["system"]]: run for run in runs},
         scores=scores,
         eqs=table,
-        study=study_table(study_rows(runs), table) if runs else None,
+        study=study_table(study, table) if runs else None,
     )
     print_eqs(table, console)
     with times.measure("report"):
@@ -127,6 +131,21 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     # Trainings may have run side by side, so the sum is work, not waiting.
     for phase, seconds in {**phases, "sum of phases": sum(phases.values())}.items():
         console.print(f"  {phase:<24}{seconds:8.1f} s")
+
+
+def with_reverse(
+    rows: list[dict[str, Any]],
+    runs: Sequence[Run],
+    data: Dataset,
+    systems: Mapping[str, EventSource],
+) -> list[dict[str, Any]]:
+    """Rows of `study.csv` with the mAP that the real-trained detector of the same seed reaches."""
+    real = {run.result()["seed"]: run for run in runs if run.result()["simulator"] == "real"}
+    found = {seed: reverse_precision(run, data, systems) for seed, run in real.items()}
+    return [
+        {**row, f"{BASELINE}reverse_map": found.get(row["seed"], {}).get(row["system"], math.nan)}
+        for row in rows
+    ]
 
 
 def scored_systems(cfg: DictConfig, runs: Sequence[Run]) -> Mapping[str, EventSource]:

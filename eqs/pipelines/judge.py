@@ -41,12 +41,14 @@ class Judge:
         weights_sha256: hash of its weights.
         readings: every reading that is reported, the headline first.
         description: what it was trained on, in a sentence.
+        untrained: the same network with seeded random weights, the control of the headline.
     """
 
     backbone: TappedBackbone
     weights_sha256: str
     readings: tuple[Reading, ...]
     description: str
+    untrained: TappedBackbone
 
     @property
     def headline(self) -> Reading:
@@ -106,6 +108,7 @@ def _trained_judge(cfg: DictConfig, run: Run) -> Judge:
         readings=_readings(cfg, taps, definition, centres),
         description=f"RVT-{config.model.size} trained on the recorded events of "
         f"{config.data.name}, {world}",
+        untrained=_untrained(cfg, config.model),
     )
 
 
@@ -137,7 +140,19 @@ def _given_judge(cfg: DictConfig, data: Dataset | None) -> Judge:
         description="random weights, a control"
         if cfg.eqs.weights == "random"
         else "weights given with eqs.weights",
+        untrained=_untrained(cfg, cfg.eqs),
     )
+
+
+def _untrained(cfg: DictConfig, network: DictConfig) -> TappedBackbone:
+    backbone, _ = load_backbone(
+        "random",
+        size=network.size,
+        bins=cfg.eqs.bins,
+        partition_split_32=network.partition_split_32,
+        seed=cfg.eqs.seed,
+    )
+    return backbone
 
 
 def _definition(cfg: DictConfig, size: str, split: int) -> Definition:

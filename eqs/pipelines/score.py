@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,8 @@ from rich.progress import track
 
 from eqs.data import EventSource, Recording, overlap_us
 from eqs.events import EventReader
-from eqs.metrics import anchors, score_streams
-from eqs.metrics.baselines import baselines
+from eqs.metrics import Reading, anchors, feature_centres, score_streams
+from eqs.metrics.baselines import FeatureFrechet, baselines
 from eqs.pipelines.judge import Judge
 from eqs.study import BASELINE
 
@@ -83,14 +83,18 @@ def score_recording(
 ) -> None:
     """Add the scores of one recording; `other` lends the chance level."""
     start, stop = overlap_us(recording.frame_times_us, real.start_us, real.stop_us)
+    candidates = list(streams.values())
+    frechet = FeatureFrechet(judge.headline.definition.tap)
     found = score_streams(
         judge.backbone,
         real,
-        list(streams.values()),
+        candidates,
         judge.readings,
         start_us=start,
         stop_us=stop,
+        watch=frechet,
     )
+    untrained = untrained_scores(judge, real, candidates, start, stop)
     alike = other is not None and (other.height, other.width) == (real.height, real.width)
     known = score_anchors(
         judge,
@@ -109,7 +113,9 @@ def score_recording(
         "definition": judge.headline.definition.hash,
         "weights_sha256": judge.weights_sha256,
     }
-    for (name, stream), by_reading in zip(streams.items(), found, strict=True):
+    for (name, stream), by_reading, without, distance in zip(
+        streams.items(), found, untrained, frechet.values(), strict=True
+    ):
         headline = by_reading[judge.headline.name]
         scores.maps.setdefault(name, []).append(headline.map)
         scores.patch_px = headline.patch_px
@@ -120,6 +126,8 @@ def score_recording(
                 "eqs": headline.score,
                 **{f"eqs_{reading}": score.score for reading, score in by_reading.items()},
                 **score_baselines(judge, stream, real, start, stop, recording.frame_times_us),
+                f"{BASELINE}untrained_eqs": without,
+                f"{BASELINE}frechet_distance": distance,
                 "n_windows": headline.n_windows,
                 "n_events_sim": len(stream.window(start, stop)),
             }
@@ -127,6 +135,19 @@ def score_recording(
     scores.anchors += [
         {"sequence": recording.name, "anchor": name, **values} for name, values in known.items()
     ]
+
+
+def untrained_scores(
+    judge: Judge, real: EventReader, candidates: Sequence[EventReader], start_us: int, stop_us: int
+) -> list[float]:
+    """The headline with the untrained network, centred on this recording's own real features."""
+    definition = judge.headline.definition
+    centres = feature_centres(judge.untrained, [real], taps=[definition.tap], definition=definition)
+    reading = Reading(definition=replace(definition, centred=True), centre=centres[definition.tap])
+    found = score_streams(
+        judge.untrained, real, candidates, [reading], start_us=start_us, stop_us=stop_us
+    )
+    return [by_reading[reading.name].score for by_reading in found]
 
 
 def score_baselines(

@@ -119,9 +119,15 @@ def summary_table(eqs: pd.DataFrame) -> Table:
     return frame_table(means[["system", *names]])
 
 
-def baselines_table(eqs: pd.DataFrame) -> Table:
-    """EQS and every rival per simulator, averaged over sequences; one row per score."""
+def baselines_table(eqs: pd.DataFrame, study: pd.DataFrame | None = None) -> Table:
+    """EQS and every rival per simulator, one row per score.
+
+    Averaged over sequences, or over seeds where only the study knows the score.
+    """
     means = summarise_eqs(eqs).set_index("system")
+    if study is not None:
+        others = [name for name in baseline_columns(study) if name not in means]
+        means = means.join(study.groupby("system")[others].mean())
     names = ["eqs", *baseline_columns(means)]
     rows = [
         (

@@ -121,7 +121,7 @@ def _tables(content: ReportContent) -> dict[str, Table]:
         "eqs_rows": frame_table(content.eqs),
     }
     if baseline_columns(content.eqs):
-        tables["baselines"] = baselines_table(content.eqs)
+        tables["baselines"] = baselines_table(content.eqs, content.study)
     if content.study is not None and len(content.study):
         tables["accuracy"] = accuracy_table(summarise_study(content.study))
         tables["study_rows"] = frame_table(content.study)

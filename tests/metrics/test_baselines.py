@@ -9,6 +9,7 @@ import torch
 from eqs.events import Events
 from eqs.metrics import corruptions as damage
 from eqs.metrics.baselines import (
+    FeatureFrechet,
     baselines,
     interval_distance,
     log_rate_error,
@@ -124,3 +125,29 @@ def test_values_are_never_silently_missing(events, name):
 def test_other_sensors_are_refused(events):
     with pytest.raises(ValueError, match="one sensor size"):
         scores(stream([0], width=3), events)
+
+
+def test_frechet_distance_of_a_shift_is_its_square_whatever_the_order():
+    torch.manual_seed(0)
+    real = [torch.randn(6, 3, 4, 5), torch.randn(6, 2, 2, 2)]
+    shifted = [(real[0] + 0.5).flip(0), (real[1] - 2.0).flip(0)]
+    pairs = [torch.stack(streams, 1) for streams in zip(real, shifted, strict=True)]
+    frechet = FeatureFrechet("hidden")
+    for part in (slice(0, 2), slice(2, 6)):
+        frechet({"hidden": [pair[part] for pair in pairs]})
+    expected = (3 * 0.5**2 + 2 * 2.0**2) / 2
+    assert frechet.values()[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_frechet_distance_forgets_place_and_time_but_not_spread():
+    torch.manual_seed(0)
+    real = torch.randn(6, 3, 4, 5)
+    moved, wider = real.flip(0).roll(2, dims=3), 3 * (real - real.mean((0, 2, 3), keepdim=True))
+    frechet = FeatureFrechet("gate")
+    frechet({"gate": [torch.stack([real, moved, wider], 1)]})
+    same, spread = frechet.values()
+    assert same == pytest.approx(0, abs=1e-4)
+    covariance = torch.cov(real.movedim(1, 0).flatten(1))
+    # Means differ by the real one; each eigenvalue v meets 9 v: v + 9 v - 2 * 3 v.
+    expected = 4 * covariance.trace() + real.mean((0, 2, 3)).square().sum()
+    assert spread == pytest.approx(float(expected), rel=1e-3)

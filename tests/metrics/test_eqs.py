@@ -56,6 +56,23 @@ def test_score_is_symmetric(backbone, make_events, centres):
 
 
 @pytest.mark.parametrize("chunk_windows", [1, 7, 100])
+def test_a_watcher_sees_every_window_that_counts(backbone, make_events, chunk_windows):
+    definition = replace(BASE, warmup_windows=4)
+    seen = []
+    score_streams(
+        backbone,
+        make_events(1),
+        [make_events(2), make_events(3)],
+        [Reading(definition=definition)],
+        chunk_windows=chunk_windows,
+        watch=lambda pooled: seen.append(pooled["hidden"][0]),
+    )
+    windows = sum(len(stage) for stage in seen)
+    assert windows == 19 - definition.warmup_of(19)
+    assert all(len(stage) and stage.shape[1] == 3 for stage in seen)
+
+
+@pytest.mark.parametrize("chunk_windows", [1, 7, 100])
 def test_chunk_length_does_not_matter(backbone, make_events, centres, chunk_windows):
     real, candidates = make_events(1), [make_events(2)]
     ways = readings(*TAPS, centres=centres)

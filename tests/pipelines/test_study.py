@@ -12,7 +12,10 @@ from omegaconf import DictConfig, open_dict
 from PIL import Image
 
 import eqs
+from eqs.data import RecordedEvents
 from eqs.pipelines import evaluate, register_resolvers, train
+from eqs.pipelines.build import dataset
+from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import finished_runs
 
 CONFIGS = Path(eqs.__file__).parent.parent / "configs"
@@ -129,6 +132,16 @@ def test_detections_are_filmed(
 
 
 @pytest.mark.slow
+def test_the_reverse_mAP_of_real_events_is_the_forward_one(
+    place: Path, trained: dict[str, dict]
+) -> None:
+    runs = {run.result()["simulator"]: run for run in finished_runs(place / "runs/dsec_mini_smoke")}
+    data = dataset(configured(place, name="evaluate"))
+    found = reverse_precision(runs["real"], data, {"again": RecordedEvents()})
+    assert found == {"again": trained["real"]["real"]["map"]}
+
+
+@pytest.mark.slow
 def test_the_study_is_written_down(place: Path, trained: dict[str, dict]) -> None:
     evaluate(configured(place, "score=true", "eqs.warmup_windows=1", name="evaluate"))
     results = place / "results/dsec_mini_smoke"
@@ -138,6 +151,9 @@ def test_the_study_is_written_down(place: Path, trained: dict[str, dict]) -> Non
     assert len(scores) == 3 * 2
     assert scores["eqs"].between(-1, 1).all()
     assert scores["eqs"].equals(scores["eqs_hidden_centred"])
+    rivals = {f"baseline_{name}" for name in ("untrained_eqs", "frechet_distance")}
+    assert rivals < set(study) & set(scores)
+    assert study.set_index("simulator")["baseline_reverse_map"].notna()["esim"]
     assert scores["weights_sha256"].nunique() == scores["definition"].nunique() == 1
     anchors = pd.read_csv(results / "anchors.csv").set_index("anchor")
     assert (anchors.loc["identical"] - 1).abs().max() < 1e-6

@@ -1,0 +1,45 @@
+"""Reverse mAP: a detector trained on real events, tested on simulated ones.
+
+What such a detector still finds in a simulated stream says how familiar the stream looks to it:
+another score of a simulator that needs no training on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hydra.utils import instantiate
+
+from eqs.data import EventSource, RecordedEvents
+from eqs.pipelines.build import Dataset
+from eqs.pipelines.runs import Run
+from eqs.pipelines.train import build_task, test_values
+
+
+def reverse_precision(
+    run: Run, data: Dataset, systems: Mapping[str, EventSource]
+) -> dict[str, float]:
+    """Test a finished detector on the test events of each system; its mAP by name.
+
+    Args:
+        run: a detector trained on real events.
+        data: its data set.
+        systems: simulated events, which must exist already.
+    """
+    config = run.config()
+    protocol = instantiate(config.protocol)
+    task = build_task(config, protocol, list(systems))
+    datamodule = instantiate(config.datamodule)(
+        dataset=data, protocol=protocol, source=RecordedEvents(), tests=systems
+    )
+    trainer = instantiate(
+        config.trainer,
+        devices=1,
+        strategy="auto",
+        logger=False,
+        enable_checkpointing=False,
+        enable_progress_bar=False,
+    )
+    metrics = trainer.test(task, datamodule, ckpt_path=run.weights, verbose=False)
+    values = {name: value for stream in metrics for name, value in stream.items()}
+    return {name: test_values(values, name)["map"] for name in systems}
