@@ -1,19 +1,25 @@
-"""Time the simulators, or the detector's fast path against the same function computed plainly."""
+"""Time the simulators, the score, or the detector against the same function computed plainly."""
 
 import argparse
 import sys
 
-from eqs.benchmarks import rvt, simulators
+from eqs.benchmarks import rvt, scoring, simulators
 
 
 def main() -> None:
     """Print one table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["simulators", "rvt"])
-    clip = parser.add_argument_group("simulators")
-    clip.add_argument("--frames", type=int, default=60)
+    parser.add_argument("what", choices=["simulators", "rvt", "eqs"])
+    clip = parser.add_argument_group("simulators and eqs")
+    clip.add_argument("--frames", type=int, help="60 for simulators, 300 windows for eqs")
     clip.add_argument("--size", default="640x480", help="width and height")
-    clip.add_argument("--only", nargs="*", choices=simulators.NAMES, default=simulators.NAMES)
+    clip.add_argument(
+        "--only",
+        nargs="*",
+        choices=simulators.NAMES,
+        default=simulators.NAMES,
+        help="some simulators",
+    )
     given = parser.parse_args()
     if given.what == "rvt":
         rvt.print_table()
@@ -21,7 +27,10 @@ def main() -> None:
     width, _, height = given.size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         sys.exit(f"Expected a size like 640x480, got {given.size}; set --size")
-    simulators.print_table(given.frames, int(width), int(height), given.only)
+    if given.what == "eqs":
+        scoring.print_table(given.frames or 300, int(width), int(height))
+    else:
+        simulators.print_table(given.frames or 60, int(width), int(height), given.only)
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ class LabelRule:
     smallest_width: float = 25 / 640
     smallest_height: float = 20 / 480
     least_visible: float = 0.5
-    least_inside: float = 0.4
+    least_inside: float = 0.15
 
     def boxes(self, view: View, t_us: int) -> NDArray[np.void]:
         """Rows of `TRACK_DTYPE` for one instant, boxes clipped to the image."""

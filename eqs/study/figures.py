@@ -263,7 +263,7 @@ def rate_curves(
             ylabel="events per pixel and second\n(closer to the real sensor is better)",
         )
         axes.margins(x=0)
-        drawing.legend(loc="outside upper left", ncols=len(rates) + 1)
+        drawing.legend(loc="outside upper left", ncols=min(len(rates) + 1, 7))
     return drawing
 
 

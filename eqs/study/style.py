@@ -19,9 +19,13 @@ DARKER = "#d7301f"
 BRIGHTER = "#2c5fd1"
 """Events of pixels that became brighter, as in the paper."""
 
-# Okabe and Ito's palette, told apart by nearly everyone; black is kept for the real sensor.
-PALETTE = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#b8a800", "#7f7f7f")
-MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+# Okabe and Ito's palette, told apart by nearly everyone, then some for large studies; black is kept
+# for the real sensor.
+PALETTE = (
+    "#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#b8a800", "#7f7f7f",
+    "#7b3294", "#5b3a1e",
+)  # fmt: skip
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*", "<", ">")
 REAL_COLOUR = "#000000"
 STYLE: dict[Any, Any] = {
     "font.size": 9,

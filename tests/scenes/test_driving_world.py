@@ -155,6 +155,7 @@ def test_label_rule_thresholds_act(world):
     assert count(smallest_height=0.3) < count()
     assert count(smallest_width=0.2) < count()
     assert count(least_visible=0.99) < count()
+    assert count(least_inside=0.99) < count()
 
 
 @pytest.mark.parametrize("factor", [2, 4])

@@ -122,3 +122,9 @@ def test_the_paper_preset_states_the_papers_thresholds(tmp_path):
 def test_the_command_line_overrides_a_preset(tmp_path):
     config = composed(tmp_path, "sim=v2e", "preset=paper", "sim.threshold_on_log=0.25")
     assert instantiate(config.sim).threshold_on_log == 0.25
+
+
+def test_the_experiment_of_all_simulators_leaves_none_out():
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("evaluate", ["experiment=all_simulators"])
+    assert set(cfg.simulators) == set(SIMULATORS) - {"real"}

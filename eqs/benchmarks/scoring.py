@@ -1,0 +1,136 @@
+"""Time the score against what it cannot do without: two passes of the judge's first stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import torch
+from rich.console import Console
+from rich.table import Table
+from torch import Tensor
+
+from eqs.benchmarks.timing import Cost, in_own_process, time_runs
+from eqs.events import Events
+from eqs.metrics import Definition, Reading, group_chunks, load_backbone, score_streams
+from eqs.metrics.windows import chunk_length
+
+STAGES: Final = (1, 2, 3)
+EVENTS_PER_SECOND: Final = 1_000_000
+MOST_IN_MEMORY: Final = 60  # windows of histograms; the ratio is one of times per window
+
+
+@dataclass(frozen=True)
+class Job:
+    """One line of the table.
+
+    Args:
+        what: passes, score or events.
+        size: rows and columns of the sensor.
+        windows: windows of 50 ms.
+    """
+
+    what: str
+    size: tuple[int, int]
+    windows: int
+
+
+LINES: Final = {
+    "two passes of stages 1-3, from histograms": "passes",
+    "score of a pair, from histograms": "score",
+    "score of a pair, from events": "events",
+}
+
+
+def measure(job: Job) -> Cost:
+    """What one run of `job` costs, once everything is set up."""
+    return time_runs(SET_UP[job.what](job), least_runs=1 if job.what == "events" else 3)
+
+
+def pair(job: Job) -> list[Events]:
+    """Two streams of events that are spread evenly, but for a share that crowds into rows."""
+    height, width = job.size
+    duration_us = job.windows * 50_000
+    count = EVENTS_PER_SECOND * duration_us // 1_000_000
+    streams = []
+    for seed in (0, 1):
+        generator = np.random.default_rng(seed)
+        streams.append(
+            Events.from_arrays(
+                t=np.sort(generator.integers(0, duration_us, count)),
+                x=generator.integers(0, width, count),
+                y=(generator.random(count) ** 2 * height).astype(np.int64),
+                p=generator.integers(0, 2, count),
+                height=height,
+                width=width,
+            )
+        )
+    return streams
+
+
+def histograms(job: Job) -> list[Tensor]:
+    """Both streams' counts, uint8, shape (windows, 20, height, width) each."""
+    chunks, _ = group_chunks(pair(job), Definition(), start_us=0, stop_us=job.windows * 50_000)
+    both = torch.cat(list(chunks))
+    return [both[:, 0].contiguous(), both[:, 1].contiguous()]
+
+
+def passes(job: Job) -> Callable[[], None]:
+    """Each stream through the first stages, as many windows at a time as the score takes."""
+    backbone, _ = load_backbone("random")
+    streams = histograms(job)
+    length = chunk_length(2, *job.size)
+
+    def run() -> None:
+        for stream in streams:
+            states = None
+            for chunk in stream.split(length):
+                with torch.no_grad():
+                    _, states = backbone.taps(
+                        chunk[:, None].float(), states, stages=STAGES, names=("hidden",)
+                    )
+
+    return run
+
+
+def score(job: Job) -> Callable[[], None]:
+    """The raw headline of histograms; a centre is one subtraction more."""
+    return _scored(histograms(job))
+
+
+def events(job: Job) -> Callable[[], None]:
+    """The same of events, which are counted first."""
+    return _scored(pair(job), stop_us=job.windows * 50_000)
+
+
+def _scored(streams: list, stop_us: int | None = None) -> Callable[[], None]:
+    backbone, _ = load_backbone("random")
+    reading = Reading(definition=Definition(stages=STAGES))
+    start_us = None if stop_us is None else 0
+
+    def run() -> None:
+        real, simulated = streams
+        score_streams(backbone, real, [simulated], [reading], start_us=start_us, stop_us=stop_us)
+
+    return run
+
+
+SET_UP: Final = {"passes": passes, "score": score, "events": events}
+
+
+def print_table(windows: int, width: int, height: int) -> None:
+    """Seconds, memory and the ratio to two passes."""
+    table = Table(title=f"A pair of streams of {width}x{height}, RVT-small")
+    for column in ("", "windows", "seconds", "ms per window", "peak MiB", "of two passes"):
+        table.add_column(column, justify="right" if column else "left")
+    base = None
+    for shown, what in LINES.items():
+        count = windows if what == "events" else min(windows, MOST_IN_MEMORY)
+        cost = in_own_process(measure, Job(what, (height, width), count))
+        each = cost.seconds / count
+        base = base or each
+        numbers = (cost.seconds, 1e3 * each, cost.peak_mib, each / base)
+        table.add_row(shown, str(count), *(f"{value:.2f}" for value in numbers))
+    Console().print(table)

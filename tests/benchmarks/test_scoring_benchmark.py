@@ -1,0 +1,25 @@
+"""The lines of the table are the same work, or their ratio means nothing."""
+
+import numpy as np
+import pytest
+import torch
+
+from eqs.benchmarks.scoring import SET_UP, Job, histograms, pair
+
+
+@pytest.mark.parametrize("what", SET_UP)
+def test_every_line_runs(what):
+    SET_UP[what](Job(what, (32, 48), 3))()
+
+
+def test_histograms_hold_the_events_of_the_windows():
+    job = Job("score", (32, 48), 3)
+    counted, streams = histograms(job), pair(job)
+    for tensor, events in zip(counted, streams, strict=True):
+        assert tensor.shape == (3, 20, 32, 48)
+        assert tensor.dtype == torch.uint8
+        # Counts saturate at ten, so compare where none does.
+        cells = np.bincount(events.y * 48 + events.x, minlength=32 * 48).reshape(32, 48)
+        total = tensor.sum(dim=(0, 1), dtype=torch.int64).numpy()
+        assert (total <= cells).all()
+        assert total.sum() > 0.9 * cells.sum()
