@@ -105,6 +105,8 @@ def singles(
     other: Events | None = None,
     frame_times_us: ArrayLike | None = None,
     window_us: int = 50_000,
+    start_us: int | None = None,
+    stop_us: int | None = None,
     seed: int = 0,
     key: str = "",
 ) -> dict[str, Events]:
@@ -114,7 +116,14 @@ def singles(
     """
     jittered = partial(damage.jittered_in_time, real, seed=seed, key=key)
     known = anchors(
-        real, other=other, frame_times_us=frame_times_us, window_us=window_us, seed=seed, key=key
+        real,
+        other=other,
+        frame_times_us=frame_times_us,
+        window_us=window_us,
+        start_us=start_us,
+        stop_us=stop_us,
+        seed=seed,
+        key=key,
     )
     return {
         **known,

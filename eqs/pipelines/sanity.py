@@ -67,6 +67,8 @@ def damaged_scores(
         other=lent if alike and other is not recording else None,
         frame_times_us=recording.frame_times_us,
         window_us=judge.headline.definition.window_us,
+        start_us=start,
+        stop_us=stop,
         key=recording.name,
     )
     found = []

@@ -30,6 +30,16 @@ def test_battery_holds_the_anchors_and_the_expected_order(events, make_events):
     assert len(everything["double_threshold"]) < 0.6 * len(events)
 
 
+def test_battery_shuffles_within_the_windows_of_the_score(events):
+    shuffled = singles(events, start_us=30_000, stop_us=1_000_000, key="a")["shuffled"]
+    window = (events.t - 30_000) // 50_000
+    for index in np.unique(window):
+        here = window == index
+        pixels = sorted(zip(events.x[here], events.y[here], events.p[here], strict=True))
+        found = sorted(zip(shuffled.x[here], shuffled.y[here], shuffled.p[here], strict=True))
+        assert found == pixels
+
+
 def test_every_graded_corruption_has_five_levels_of_growing_damage(events):
     families = {}
     for grade in GRADED:
