@@ -20,7 +20,6 @@ from eqs.data.datasets import (
 )
 from eqs.data.labels import LabelProtocol
 from eqs.data.recording import Recording
-from eqs.data.sampling import Sampling
 
 
 class Splits(Protocol):
@@ -94,7 +93,7 @@ class EventDataModule(lightning.LightningDataModule):
         sequence_length: windows per sample.
         steps_per_epoch: training steps between two ends of an epoch.
         epochs: number of epochs.
-        sampling: kind of the samples: mixed, stream or random.
+        stream_share: share of the samples that play whole recordings; the others are random.
         augmentation: random changes to training samples; none if None.
         bins: time bins per polarity.
         window_us: length of a window.
@@ -118,7 +117,7 @@ class EventDataModule(lightning.LightningDataModule):
         sequence_length: int = 5,
         steps_per_epoch: int = 100,
         epochs: int = 20,
-        sampling: Sampling = "mixed",
+        stream_share: float = 0.5,
         augmentation: Augmentation | None = None,
         bins: int = 10,
         window_us: int = 50_000,
@@ -143,7 +142,7 @@ class EventDataModule(lightning.LightningDataModule):
         self.binning = Binning(bins=bins, window_us=window_us, count_cutoff=count_cutoff)
         self.seed, self.batch_size, self.sequence_length = seed, batch_size, sequence_length
         self.steps_per_epoch, self.epochs = steps_per_epoch, epochs
-        self.sampling, self.augmentation = sampling, augmentation
+        self.stream_share, self.augmentation = stream_share, augmentation
         self.evaluation_length, self.num_workers = evaluation_length, num_workers
 
     def prepare_data(self) -> None:
@@ -171,7 +170,7 @@ class EventDataModule(lightning.LightningDataModule):
             steps=self.epochs * self.steps_per_epoch,
             batch_size=self.batch_size,
             sequence_length=self.sequence_length,
-            sampling=self.sampling,
+            stream_share=self.stream_share,
             augmentation=self.augmentation,
             rank=rank,
             world_size=world_size,

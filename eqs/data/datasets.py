@@ -16,7 +16,7 @@ from torch.utils.data import Dataset
 from eqs.data.augment import Augmentation, View, visible
 from eqs.data.labels import LabelProtocol, detector_rows
 from eqs.data.recording import Recording
-from eqs.data.sampling import Chunk, Sampling, Schedule, keyed_generator
+from eqs.data.sampling import Chunk, Schedule, keyed_generator
 from eqs.data.windows import detection_windows
 from eqs.events import EventReader
 from eqs.representations import stacked_histogram
@@ -150,7 +150,7 @@ class TrainingDataset(Dataset[Batch]):
         steps: number of steps.
         batch_size: samples per batch and process.
         sequence_length: windows per sample, T.
-        sampling: kind of the samples.
+        stream_share: share of the samples that play whole recordings; the others are random.
         augmentation: random changes; none if None.
         rank: number of this process among those that train together.
         world_size: number of those processes.
@@ -167,7 +167,7 @@ class TrainingDataset(Dataset[Batch]):
         steps: int,
         batch_size: int,
         sequence_length: int,
-        sampling: Sampling = "mixed",
+        stream_share: float = 0.5,
         augmentation: Augmentation | None = None,
         rank: int = 0,
         world_size: int = 1,
@@ -182,7 +182,7 @@ class TrainingDataset(Dataset[Batch]):
             window_counts=tuple(len(source) for source in self.sources),
             batch_size=batch_size,
             sequence_length=sequence_length,
-            sampling=sampling,
+            stream_share=stream_share,
             ends=tuple(source.labelled_windows() for source in self.sources),
             rank=rank,
             world_size=world_size,

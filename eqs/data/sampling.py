@@ -6,14 +6,12 @@ processes, meets the same windows in the same order.
 
 from __future__ import annotations
 
+import math
 import zlib
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-
-Sampling = Literal["mixed", "stream", "random"]
 
 
 def keyed_generator(seed: int, *key: str | int) -> np.random.Generator:
@@ -55,15 +53,15 @@ class Schedule:
     """The windows of every training step.
 
     A stream slot plays all recordings whole, again and again, each pass in an order of its own. A
-    random slot takes a run of windows from anywhere, each as likely as any other. Of a mixed batch
-    the first half (rounded up) are stream slots.
+    random slot takes a run of windows from anywhere, each as likely as any other. Stream slots come
+    first in a batch.
 
     Args:
         seed: what all draws depend on.
         window_counts: number of windows of each recording.
         batch_size: slots per process.
         sequence_length: windows per sample.
-        sampling: kind of the slots.
+        stream_share: share of stream slots, rounded up to whole slots.
         ends: for each recording the windows at which random samples may end, those with labels;
             all of them if None.
         rank: number of this process among those that train together.
@@ -77,17 +75,17 @@ class Schedule:
     window_counts: tuple[int, ...]
     batch_size: int
     sequence_length: int
-    sampling: Sampling = "mixed"
+    stream_share: float = 0.5
     ends: tuple[NDArray[np.int64], ...] | None = None
     rank: int = 0
     world_size: int = 1
 
     def __post_init__(self) -> None:
         """Check that every slot will find windows."""
-        if self.sampling not in ("mixed", "stream", "random"):
+        if not 0.0 <= self.stream_share <= 1.0:
             raise ValueError(
-                f"Expected sampling to be mixed, stream or random, got {self.sampling!r}; "
-                "set datamodule.sampling"
+                f"Expected a share of streams in [0, 1], got {self.stream_share}; "
+                "set recipe.stream_share"
             )
         if min(self.batch_size, self.sequence_length) < 1 or self.seed < 0:
             raise ValueError(
@@ -109,9 +107,7 @@ class Schedule:
     @property
     def stream_slots(self) -> int:
         """Slots of a batch that play whole recordings; the others are random ones."""
-        return {"stream": self.batch_size, "random": 0, "mixed": (self.batch_size + 1) // 2}[
-            self.sampling
-        ]
+        return math.ceil(self.stream_share * self.batch_size - 1e-9)  # 0.7 * 10 exceeds 7
 
     def chunk(self, step: int, position: int) -> Chunk:
         """The windows of one slot of this process's batch at one step."""

@@ -67,7 +67,7 @@ def test_batch_has_the_agreed_shapes_and_types(recordings):
 
 
 def test_stream_slot_shows_the_recordings_windows_and_labels(recordings):
-    dataset = training(recordings, batch_size=1, sampling="stream")
+    dataset = training(recordings, batch_size=1, stream_share=1)
     for step in range(12):
         chunk, batch = dataset.schedule.chunk(step, 0), dataset[step]
         recording = recordings[chunk.recording]
@@ -108,7 +108,7 @@ def iterate(dataset):
 
 def test_random_samples_always_end_at_a_label(recordings):
     unsure = LabelProtocol(name="u", classes=PROTOCOL.classes, score_empty_frames=False)
-    dataset = training(recordings[1:2], unsure, sampling="random")
+    dataset = training(recordings[1:2], unsure, stream_share=0)
     assert all(batch["labelled"].any(dim=0).all() for batch in iterate(dataset))
 
 
@@ -123,11 +123,11 @@ def test_batches_do_not_depend_on_order_or_copies(recordings):
 
 
 def test_augmented_stream_keeps_its_view_through_a_recording(recordings):
-    plain = training(recordings, batch_size=1, sampling="stream", sequence_length=2)
+    plain = training(recordings, batch_size=1, stream_share=1, sequence_length=2)
     moved = training(
         recordings,
         batch_size=1,
-        sampling="stream",
+        stream_share=1,
         sequence_length=2,
         augmentation=Augmentation(flip_probability=0.5, stream_zoom_probability=0.0),
     )

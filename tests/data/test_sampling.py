@@ -24,9 +24,7 @@ def schedule(**options):
     seed=st.integers(0, 99),
 )
 def test_stream_slot_plays_every_window_once_per_pass_in_order(counts, length, slot, seed):
-    plan = schedule(
-        seed=seed, window_counts=tuple(counts), sequence_length=length, sampling="stream"
-    )
+    plan = schedule(seed=seed, window_counts=tuple(counts), sequence_length=length, stream_share=1)
     chunks_per_pass = sum(-(-count // length) for count in counts)
     for number in range(2):
         steps = range(number * chunks_per_pass, (number + 1) * chunks_per_pass)
@@ -44,7 +42,7 @@ def test_stream_slot_plays_every_window_once_per_pass_in_order(counts, length, s
 
 
 def test_passes_and_slots_have_orders_of_their_own():
-    plan = schedule(window_counts=(5,) * 12, sampling="stream")
+    plan = schedule(window_counts=(5,) * 12, stream_share=1)
 
     def order(slot, number):
         return [plan.chunk(12 * number + k, slot).recording for k in range(12)]
@@ -53,7 +51,7 @@ def test_passes_and_slots_have_orders_of_their_own():
 
 
 def test_random_windows_are_equally_likely_and_inside():
-    plan = schedule(sampling="random", window_counts=(20, 10, 3), sequence_length=4)
+    plan = schedule(stream_share=0, window_counts=(20, 10, 3), sequence_length=4)
     chunks = [plan.chunk(step, slot) for step in range(1500) for slot in range(4)]
     ends = Counter((each.recording, each.start + each.count - 1) for each in chunks)
     expected = len(chunks) / 33
@@ -67,7 +65,7 @@ def test_random_windows_are_equally_likely_and_inside():
 
 def test_random_windows_end_at_labels():
     ends = (np.array([9]), np.array([], np.int64), np.array([4, 7]))
-    plan = schedule(sampling="random", window_counts=(10, 10, 10), ends=ends)
+    plan = schedule(stream_share=0, window_counts=(10, 10, 10), ends=ends)
     found = {
         (each.recording, each.start + each.count - 1)
         for each in (plan.chunk(step, 0) for step in range(200))
@@ -76,11 +74,20 @@ def test_random_windows_end_at_labels():
 
 
 @pytest.mark.parametrize(
-    ("sampling", "size", "stream"),
-    [("mixed", 8, 4), ("mixed", 5, 3), ("mixed", 1, 1), ("stream", 3, 3), ("random", 3, 0)],
+    ("share", "size", "stream"),
+    [
+        (0.5, 8, 4),
+        (0.5, 5, 3),
+        (0.5, 1, 1),
+        (0.25, 4, 1),
+        (0.25, 5, 2),
+        (0.7, 10, 7),
+        (1, 3, 3),
+        (0, 3, 0),
+    ],
 )
-def test_kinds_of_slots(sampling, size, stream):
-    plan = schedule(sampling=sampling, batch_size=size)
+def test_kinds_of_slots(share, size, stream):
+    plan = schedule(stream_share=share, batch_size=size)
     kinds = [plan.chunk(7, position).stream for position in range(size)]
     assert kinds == [True] * stream + [False] * (size - stream)
 
@@ -94,9 +101,9 @@ def test_depends_on_seed_step_and_slot_only():
 
 
 def test_processes_have_slots_of_their_own():
-    whole = schedule(sampling="stream", batch_size=6, window_counts=(5,) * 9)
+    whole = schedule(stream_share=1, batch_size=6, window_counts=(5,) * 9)
     ranks = [
-        schedule(sampling="stream", batch_size=3, window_counts=(5,) * 9, rank=rank, world_size=2)
+        schedule(stream_share=1, batch_size=3, window_counts=(5,) * 9, rank=rank, world_size=2)
         for rank in range(2)
     ]
     for step in range(10):
@@ -118,7 +125,7 @@ def test_keys_do_not_collide():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"sampling": "all"}, r"mixed, stream or random, got 'all'; set datamodule\.sampling"),
+        ({"stream_share": 1.5}, r"share of streams in \[0, 1\], got 1.5; set recipe\.stream"),
         ({"batch_size": 0}, r"set recipe\.batch_size"),
         ({"seed": -1}, "a seed of at least 0, got 4, 5 and -1"),
         ({"window_counts": (3, 0)}, "at least one window"),
