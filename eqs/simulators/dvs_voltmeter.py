@@ -15,10 +15,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval, Simulator, require_not_negative, require_positive
+from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.passage import chance_of_on, passage_time
 from eqs.simulators.randomness import draw_key, uniform, uniform_map, word_at
+from eqs.simulators.stream import Interval
 
 
 @dataclass(frozen=True, kw_only=True)

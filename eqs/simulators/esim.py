@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval, Simulator, require_not_negative, require_positive
+from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.crossing import (
     SMALLEST_CHANGE_LOG,
     crossing_share,
@@ -23,6 +23,7 @@ from eqs.simulators.crossing import (
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.photoreceptor import log_intensity
 from eqs.simulators.randomness import draw_key, normal, word_at
+from eqs.simulators.stream import Interval
 from eqs.simulators.thresholds import SMALLEST_THRESHOLD_LOG, threshold_map
 
 

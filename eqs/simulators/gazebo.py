@@ -14,8 +14,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval, Simulator, require_positive
+from eqs.simulators.base import Simulator, require_positive
 from eqs.simulators.ordering import event_key
+from eqs.simulators.stream import Interval
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,11 +10,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval
 from eqs.simulators.latency import SEEING, latency
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.photoreceptor import MICROSECONDS
 from eqs.simulators.randomness import draw_key, uniform_map, word_at
+from eqs.simulators.stream import Interval
 from eqs.simulators.thresholds import redraw, threshold_map
 
 if TYPE_CHECKING:

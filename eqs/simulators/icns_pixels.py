@@ -10,12 +10,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval
 from eqs.simulators.latency import SEEING, latency
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.photoreceptor import MICROSECONDS
 from eqs.simulators.ramp_response import first_crossing, response
 from eqs.simulators.randomness import draw_key, uniform, word_at
+from eqs.simulators.stream import Interval
 from eqs.simulators.thresholds import SMALLEST_THRESHOLD_LOG, redraw, threshold_map
 
 if TYPE_CHECKING:

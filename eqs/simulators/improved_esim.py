@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.bandwidth import PixelFilter
-from eqs.simulators.base import Interval, Simulator, require_not_negative, require_positive
+from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.crossing import RELATIVE_TOLERANCE
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.photoreceptor import MICROSECONDS
 from eqs.simulators.randomness import draw_key, uniform_map
+from eqs.simulators.stream import Interval
 from eqs.simulators.thresholds import threshold_map
 
 ORDERS = (0, 2, 3, 4)

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.simulators.base import Interval
 from eqs.simulators.crossing import fire_levels, firing_pixels
 from eqs.simulators.noise import scatter_noise
 from eqs.simulators.ordering import Fired, with_room
 from eqs.simulators.randomness import draw_key, uniform_map
+from eqs.simulators.stream import Interval
 
 
 class LevelMemory:

@@ -54,11 +54,11 @@ def _in_raster_order(keys: NDArray[np.int64]) -> bool:
 
 @njit(cache=True, nogil=True)
 def _radix_sorted(keys: NDArray[np.int64], base: int, lowest_bit: int) -> NDArray[np.int64]:
-    """Stable radix sort on what is left of `key - base` above its lowest bits."""
+    """Stable radix sort, in place or not, on what is left of `key - base` above its lowest bits."""
     largest = 0
     for key in keys:
         largest = max(largest, key - base)
-    source, target = keys.copy(), np.empty_like(keys)
+    source, target = keys, np.empty_like(keys)
     shift = lowest_bit
     while largest >> shift:
         counts = np.zeros((1 << _DIGIT_BITS) + 1, np.int64)
@@ -79,7 +79,8 @@ def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
     """Sort the keys of one frame interval by (time, pixel); equal ones keep their order.
 
     Args:
-        keys: events in the order in which a kernel wrote them, times not before `start_us`.
+        keys: events in the order in which a kernel wrote them, times not before `start_us`;
+            used as scratch.
         start_us: start of the interval on the stream's clock.
     """
     # What was written row by row is already sorted by pixel, and only its times need sorting.

@@ -15,8 +15,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval, Simulator, require_positive
+from eqs.simulators.base import Simulator, require_positive
 from eqs.simulators.ordering import Fired, event_key, with_room
+from eqs.simulators.stream import Interval
 
 REFERENCE_UPDATES = ("previous", "replace", "integrate", "never")
 BLOCKS = (1, 2, 4)

@@ -9,12 +9,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval
 from eqs.simulators.crossing import crossing_share, officially_crossed
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.photoreceptor import MICROSECONDS
 from eqs.simulators.prophesee_pixels import PropheseePixels
 from eqs.simulators.randomness import draw_key, uniform, word_at
+from eqs.simulators.stream import Interval
 
 
 class FaithfulPropheseePixels(PropheseePixels):

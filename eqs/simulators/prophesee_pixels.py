@@ -9,12 +9,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval
 from eqs.simulators.level_memory import LevelMemory
 from eqs.simulators.noise import shot_events
 from eqs.simulators.ordering import Fired
 from eqs.simulators.photoreceptor import MICROSECONDS, filter_share
 from eqs.simulators.randomness import draw_key
+from eqs.simulators.stream import Interval
 from eqs.simulators.thresholds import threshold_map
 
 if TYPE_CHECKING:

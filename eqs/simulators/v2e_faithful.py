@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from eqs.simulators.base import Interval
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.photoreceptor import MICROSECONDS
 from eqs.simulators.randomness import draw_key, normal, uniform, word_at
+from eqs.simulators.stream import Interval
 from eqs.simulators.v2e_pixels import V2EPixels
 
 

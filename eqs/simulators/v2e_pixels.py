@@ -9,7 +9,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.base import Interval
 from eqs.simulators.level_memory import LevelMemory
 from eqs.simulators.noise import shot_events
 from eqs.simulators.ordering import Fired
@@ -21,6 +20,7 @@ from eqs.simulators.randomness import (
     normal_quantile,
     word_at,
 )
+from eqs.simulators.stream import Interval
 from eqs.simulators.thresholds import threshold_map
 
 if TYPE_CHECKING:
