@@ -7,7 +7,13 @@ from eqs.metrics.detection import MeanAveragePrecision
 from eqs.metrics.eqs import EventQualityScore, load_backbone
 from eqs.metrics.features import TappedBackbone, pooled_features
 from eqs.metrics.scoring import Reading, StreamScore, score_group, score_streams
-from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine, pool_patches
+from eqs.metrics.similarity import (
+    combine_maps,
+    mean_over_stages,
+    patch_cosine,
+    pool_grid,
+    pool_patches,
+)
 from eqs.metrics.windows import group_chunks, histogram_chunks, window_starts
 
 __all__ = [
@@ -29,6 +35,7 @@ __all__ = [
     "load_backbone",
     "mean_over_stages",
     "patch_cosine",
+    "pool_grid",
     "pool_patches",
     "pooled_features",
     "score_group",

@@ -135,8 +135,7 @@ def feature_centres(
             backbone,
             chunks,
             taps=taps,
-            stages=definition.stages,
-            patch_size=definition.patch_size,
+            definition=definition,
             device=device,
         ):
             for tap in taps:

@@ -13,13 +13,20 @@ from torch import nn
 
 TAPS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 
+KINDS = {
+    "patch": ("cells", "grid"),
+    "state": ("carried", "reset"),
+    "mask": ("none", "active"),
+    "span": ("window", "events"),
+}
+
 # Choices that have one reading here. They are part of the hash, so that a later alternative
 # cannot be mistaken for this one.
 FIXED_RULES = {
     "aggregation": "mean over patches, stages with equal weights, windows, sequences",
     "distance": "cosine",
-    "patch": "square cells, not overlapping, padded right and bottom, mean of real cells",
-    "state": "carried from zero, one per stream",
+    "pooling": "mean of real cells, patches do not overlap, padded right and bottom",
+    "start": "state zero, one per stream",
     "warmup": "first min(warmup_windows, n // 4) windows",
     "zero": "both zero 1, one zero 0, eps 1e-8",
 }
@@ -39,7 +46,10 @@ class Definition:
         tap: which activation of each stage is compared.
         centred: whether the mean real feature is subtracted before the cosine.
         stages: stages of the backbone, counted from 1.
-        patch_size: side of a patch in cells.
+        patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
+        patch_size: side of a patch in cells, or patches per side of the map.
+        state: `carried` from window to window, or `reset` to zero before each.
+        mask: `none`, or `active`: only patches in which either stream has events count.
         bins: time bins per window and polarity.
         window_us: length of a window in microseconds.
         count_cutoff: events per pixel and bin at which the histogram saturates.
@@ -58,7 +68,10 @@ class Definition:
     tap: str = "hidden"
     centred: bool = False
     stages: tuple[int, ...] = (1, 2, 3)
+    patch: Literal["cells", "grid"] = "cells"
     patch_size: int = 3
+    state: Literal["carried", "reset"] = "carried"
+    mask: Literal["none", "active"] = "none"
     bins: int = 10
     window_us: int = 50_000
     count_cutoff: int = 10
@@ -78,8 +91,12 @@ class Definition:
             raise ValueError(
                 f"Expected stages counted from 1 in rising order, got {self.stages}; set eqs.stages"
             )
-        if self.span not in ("window", "events"):
-            raise ValueError(f"Expected span window or events, got {self.span!r}; set eqs.span")
+        for name, known in KINDS.items():
+            if getattr(self, name) not in known:
+                raise ValueError(
+                    f"Expected {name} {' or '.join(known)}, got {getattr(self, name)!r}; "
+                    f"set eqs.{name}"
+                )
         for name in ("patch_size", "bins", "window_us", "count_cutoff", "warmup_windows"):
             value, least = getattr(self, name), int(name != "warmup_windows")
             if not isinstance(value, int) or value < least:

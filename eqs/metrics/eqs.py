@@ -44,7 +44,10 @@ class EventQualityScore(Metric):
         centre: mean real feature: a file, a `Centre`, or one tensor per stage.
         centred: whether a centre must be given; None takes whatever `centre` says.
         stages: stages of the backbone, counted from 1.
-        patch_size: side of a patch in cells.
+        patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
+        patch_size: side of a patch in cells, or patches per side of the map.
+        state: `carried` from window to window, or `reset` to zero before each.
+        mask: `none`, or `active`: only patches in which either stream has events count.
         bins: time bins per window and polarity.
         window_us: length of a window in microseconds.
         count_cutoff: events per pixel and bin at which the histogram saturates.
@@ -80,7 +83,10 @@ class EventQualityScore(Metric):
         centre: Centre | Path | str | Sequence[Tensor] | None = None,
         centred: bool | None = None,
         stages: Sequence[int] = (1, 2, 3),
+        patch: Literal["cells", "grid"] = "cells",
         patch_size: int = 3,
+        state: Literal["carried", "reset"] = "carried",
+        mask: Literal["none", "active"] = "none",
         bins: int = 10,
         window_us: int = 50_000,
         count_cutoff: int = 10,
@@ -105,7 +111,10 @@ class EventQualityScore(Metric):
             tap=tap,
             centred=centre is not None if centred is None else centred,
             stages=tuple(stages),
+            patch=patch,
             patch_size=patch_size,
+            state=state,
+            mask=mask,
             bins=bins,
             window_us=window_us,
             count_cutoff=count_cutoff,

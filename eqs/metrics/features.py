@@ -9,9 +9,12 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor, nn
 
-from eqs.metrics.similarity import pool_patches
+from eqs.metrics.definition import Definition
+from eqs.metrics.similarity import pool_grid, pool_patches
 
 RVT_STRIDES = (4, 8, 16, 32)
+ACTIVE = "active"
+"""Name, beside those of the taps, of whether a patch has events."""
 
 # Whatever a backbone carries from one window to the next; only the backbone looks inside.
 States = Any
@@ -52,46 +55,52 @@ def pooled_features(
     chunks: Iterable[Tensor],
     *,
     taps: Sequence[str],
-    stages: Sequence[int],
-    patch_size: int,
+    definition: Definition,
     device: torch.device | str = "cpu",
 ) -> Iterator[dict[str, list[Tensor]]]:
     """Run streams side by side through the backbone and pool its maps.
 
-    The state is carried from chunk to chunk, one per stream, from zero. Cells that lie wholly in
-    the padding below and right of the image are cut off before pooling.
+    The state is carried from chunk to chunk, one per stream, from zero, or reset for every window.
+    Cells that lie wholly in the padding below and right of the image are cut off before pooling.
 
     Args:
         backbone: network with `taps`; it runs in evaluation mode and in float32.
         chunks: histograms, shape (windows, streams, channels, height, width) each.
         taps: activations to pool.
-        stages: stages to pool, counted from 1.
-        patch_size: side of a patch in cells.
+        definition: stages, patches and state.
         device: where the backbone lives.
 
     Yields:
         For each chunk, by tap a list by stage of shape (windows, streams, channels, patch rows,
-        patch columns), float32.
+        patch columns), float32. Under a mask also, as `ACTIVE`, whether a patch has events, bool,
+        with one channel.
 
     Raises:
         ValueError: the backbone has fewer stages.
     """
+    stages, side = definition.stages, definition.patch_size
+    pool = pool_patches if definition.patch == "cells" else pool_grid
     strides = strides_of(backbone, stages)
     states: States = None
     for chunk in chunks:
-        height, width = chunk.shape[-2:]
+        (windows, streams), (height, width) = chunk.shape[:2], chunk.shape[-2:]
         with _evaluation(backbone), torch.no_grad(), _full_precision(device):
             x = chunk.to(device=device, dtype=torch.float32)
-            maps, states = backbone.taps(x, states, stages=tuple(stages), names=tuple(taps))
+            if definition.state == "reset":  # as many streams of one window each
+                x, states = x.flatten(0, 1)[None], None
+            maps, states = backbone.taps(x, states, stages=stages, names=tuple(taps))
             pooled = {
                 name: [
-                    pool_patches(
-                        full[..., : -(-height // stride), : -(-width // stride)].float(), patch_size
-                    )
+                    pool(full[..., : -(-height // stride), : -(-width // stride)].float(), side)
+                    .flatten(0, 1)
+                    .unflatten(0, (windows, streams))
                     for full, stride in zip(maps[name], strides, strict=True)
                 ]
                 for name in taps
             }
+            if definition.mask == "active":
+                counts = chunk.to(device=device, dtype=torch.float32).sum(dim=2, keepdim=True)
+                pooled[ACTIVE] = [pool(pool_patches(counts, px), side) > 0 for px in strides]
         yield pooled
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -12,8 +12,8 @@ from torch import Tensor
 
 from eqs.metrics.centre import Centre
 from eqs.metrics.definition import Definition
-from eqs.metrics.features import TappedBackbone, pooled_features, strides_of
-from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine
+from eqs.metrics.features import ACTIVE, TappedBackbone, pooled_features, strides_of
+from eqs.metrics.similarity import combine_maps, patch_cosine
 from eqs.metrics.windows import Stream, group_chunks
 
 Watcher = Callable[[Mapping[str, Sequence[Tensor]]], None]
@@ -28,16 +28,17 @@ class StreamScore:
     Args:
         score: mean over windows after the warm-up, in [-1, 1], higher is better.
         by_stage: the same for each stage alone.
-        map: mean over windows and stages, by patch of the finest stage, shape (rows, columns).
-        patch_px: side of a patch of the map in pixels.
-        curve: score of every window, warm-up included, shape (windows,).
+        map: mean over windows and stages, by patch of the finest stage, shape (rows, columns);
+            NaN where no window counts.
+        patch_px: side of a patch of the map in pixels; None where the map is cut evenly.
+        curve: score of every window, warm-up included, shape (windows,); NaN where no patch counts.
         warmup: windows at the start that do not count.
     """
 
     score: float
     by_stage: tuple[float, ...]
     map: NDArray[np.float64]
-    patch_px: int
+    patch_px: int | None
     curve: NDArray[np.float64]
     warmup: int
 
@@ -125,12 +126,11 @@ def score_group(
         backbone,
         chunks,
         taps=taps,
-        stages=first.stages,
-        patch_size=first.patch_size,
+        definition=first,
         device=device,
     ):
         for tally in totals.values():
-            tally.add(pooled[tally.tap], skip)
+            tally.add(pooled, skip)
         windows = len(pooled[taps[0]][0])
         if watch is not None and windows > skip:
             watch({tap: [stage[skip:] for stage in stages] for tap, stages in pooled.items()})
@@ -186,8 +186,8 @@ def score_streams(
 def _shared_pass(readings: Sequence[Reading]) -> Definition:
     """The choices that all readings share, or an error where they do not."""
     shared = {
-        (d.stages, d.patch_size, d.bins, d.window_us, d.count_cutoff, d.span, d.warmup_windows)
-        for d in (reading.definition for reading in readings)
+        replace(reading.definition, tap=readings[0].definition.tap, centred=False)
+        for reading in readings
     }
     if len(shared) != 1 or len({reading.name for reading in readings}) < len(readings):
         raise ValueError(
@@ -201,51 +201,55 @@ class _Tally:
     """Running sums of one reading over the chunks of a group of streams."""
 
     def __init__(self, reading: Reading, warmup: int, strides: Sequence[int]) -> None:
-        definition = reading.definition
-        self.tap = definition.tap
-        self.patch_size = definition.patch_size
+        self.definition = reading.definition
         self.warmup, self.strides = warmup, strides
-        means = reading.centre.for_stages(definition.stages) if reading.centre else None
+        means = reading.centre.for_stages(self.definition.stages) if reading.centre else None
         self.centres: Sequence[Tensor | None] = means or [None] * len(strides)
         self.curves: list[Tensor] = []
-        self.maps: list[Tensor] | None = None
+        self.sums: list[Tensor] = []
+        """By stage, for every patch, the summed cosines and the number of windows that count."""
 
-    def add(self, pooled: Sequence[Tensor], skip: int) -> None:
+    def add(self, pooled: Mapping[str, Sequence[Tensor]], skip: int) -> None:
         """Compare a chunk's streams, by stage (windows, streams, channels, rows, columns).
 
         The chunk's first `skip` windows are warm-up and only show in the curve.
         """
-        cosines = [
-            patch_cosine(stage[:, 1:], stage[:, :1], centre)
-            for stage, centre in zip(pooled, self.centres, strict=True)
-        ]
-        by_stage = torch.stack([mean_over_stages([cosine]) for cosine in cosines], dim=-1)
-        self.curves.append(by_stage.cpu())
-        kept = [cosine[skip:].double().sum(dim=0).cpu() for cosine in cosines]
-        self.maps = (
-            kept if self.maps is None else [a + b for a, b in zip(self.maps, kept, strict=True)]
-        )
+        curves, sums = [], []
+        nowhere: list[Tensor | None] = [None] * len(self.centres)
+        masks = pooled.get(ACTIVE, nowhere)
+        stages = zip(pooled[self.definition.tap], masks, self.centres, strict=True)
+        for stage, active, centre in stages:
+            cosine = patch_cosine(stage[:, 1:], stage[:, :1], centre).double()
+            if not torch.isfinite(cosine).all():
+                raise ValueError(
+                    "Expected finite features, got NaN or infinity; set eqs.weights to a sound "
+                    "checkpoint"
+                )
+            counts = torch.ones_like(cosine)
+            if active is not None:
+                counts = (active[:, 1:, 0] | active[:, :1, 0]).double()
+            curves.append((cosine * counts).sum(dim=(-2, -1)) / counts.sum(dim=(-2, -1)))
+            sums.append(torch.stack([cosine * counts, counts])[:, skip:].sum(dim=1).cpu())
+        self.curves.append(torch.stack(curves, dim=-1).cpu())
+        before = self.sums or [torch.zeros_like(stage) for stage in sums]
+        self.sums = [a + b for a, b in zip(before, sums, strict=True)]
 
     def scores(self) -> list[StreamScore]:
         """One score per candidate."""
-        if self.maps is None:
+        if not self.curves:
             raise ValueError("Expected at least one window, got none")
         curve = torch.cat(self.curves)
-        by_stage = curve[self.warmup :].mean(dim=0)
-        if not torch.isfinite(by_stage).all():
-            raise ValueError(
-                "Expected finite features, got NaN or infinity; set eqs.weights to a sound "
-                "checkpoint"
-            )
-        image = combine_maps(
-            [total / (len(curve) - self.warmup) for total in self.maps], self.strides
-        )
+        # Without a single active patch both streams are silent, and silence equals silence.
+        by_stage = curve[self.warmup :].nanmean(dim=0).nan_to_num(nan=1.0)
+        cells = self.definition.patch == "cells"
+        strides = self.strides if cells else [1] * len(self.strides)
+        image = combine_maps([total / windows for total, windows in self.sums], strides)
         return [
             StreamScore(
                 score=float(by_stage[index].mean()),
                 by_stage=tuple(by_stage[index].tolist()),
                 map=image[index].numpy(),
-                patch_px=self.patch_size * min(self.strides),
+                patch_px=self.definition.patch_size * min(self.strides) if cells else None,
                 curve=curve[:, index].mean(dim=-1).numpy(),
                 warmup=self.warmup,
             )

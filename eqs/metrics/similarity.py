@@ -34,6 +34,26 @@ def pool_patches(maps: Tensor, size: int = 3) -> Tensor:
     return pooled.reshape(*maps.shape[:-2], *pooled.shape[-2:])
 
 
+def pool_grid(maps: Tensor, side: int = 3) -> Tensor:
+    """Mean feature vector of every part of a map cut into `side` by `side` parts.
+
+    Convention: parts that do not come out even share their border cells.
+
+    Args:
+        maps: feature maps, shape (..., channels, rows, columns).
+        side: parts per side.
+
+    Returns:
+        Shape (..., channels, side, side).
+
+    Example:
+        >>> pool_grid(torch.arange(4.0).view(1, 1, 4), side=1)
+        tensor([[[1.5000]]])
+    """
+    flat = maps.reshape(-1, *maps.shape[-3:])
+    return F.adaptive_avg_pool2d(flat, side).reshape(*maps.shape[:-2], side, side)
+
+
 def patch_cosine(a: Tensor, b: Tensor, centre: Tensor | None = None, eps: float = 1e-8) -> Tensor:
     r"""Cosine between the feature vectors of two streams, patch by patch.
 

@@ -28,7 +28,8 @@ log = logging.getLogger(__name__)
 EMBEDDED_DATA = "dsec_mini"
 # What an EQS configuration says about the definition; the rest says where the judge is.
 CHOICES = (
-    "stages", "patch_size", "bins", "window_us", "count_cutoff", "span", "warmup_windows",
+    "stages", "patch", "patch_size", "mask", "state",
+    "bins", "window_us", "count_cutoff", "span", "warmup_windows",
 )  # fmt: skip
 
 

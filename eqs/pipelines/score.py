@@ -31,13 +31,13 @@ class Scores:
         rows: one per (system, recording), as `eqs.csv` wants them.
         anchors: one per (recording, anchor), a column for each reading.
         maps: by system one headline map per recording.
-        patch_px: side of a map's patch in pixels.
+        patch_px: side of a map's patch in pixels; None where maps are cut evenly.
     """
 
     rows: list[dict[str, Any]] = field(default_factory=list)
     anchors: list[dict[str, Any]] = field(default_factory=list)
     maps: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
-    patch_px: int = 0
+    patch_px: int | None = None
 
 
 def score_recordings(

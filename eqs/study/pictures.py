@@ -171,7 +171,7 @@ def score_maps(
     frame: NDArray[np.uint8] | None,
     maps: Mapping[str, ArrayLike],
     *,
-    patch_px: int,
+    patch_px: int | None,
     height: int,
     width: int,
 ) -> Figure:
@@ -181,7 +181,7 @@ def score_maps(
         frame: a video frame of the scene for the first panel, if there is one.
         maps: by simulator, shape (patch rows, patch columns), patches counted from the upper
             left; NaN where nothing was scored. Patches may reach beyond the image.
-        patch_px: side of a patch in pixels.
+        patch_px: side of a patch in pixels; None where the patches divide the image evenly.
         height: rows of the image.
         width: columns of the image.
 
@@ -198,13 +198,15 @@ def score_maps(
         if frame is not None:
             _frame(panels[0], frame, "video frame")
         for axes, (name, values) in zip(panels[frame is not None :], arrays.items(), strict=True):
-            rows, columns = values.shape
+            reach = (height, width)
+            if patch_px is not None:
+                reach = (values.shape[0] * patch_px, values.shape[1] * patch_px)
             drawn = axes.imshow(
                 np.ma.masked_invalid(values),
                 cmap="viridis",
                 vmin=low,
                 vmax=high if high > low else low + 1,
-                extent=(-0.5, columns * patch_px - 0.5, rows * patch_px - 0.5, -0.5),
+                extent=(-0.5, reach[1] - 0.5, reach[0] - 0.5, -0.5),
                 interpolation="nearest",
             )
             axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))

@@ -132,6 +132,56 @@ def test_state_is_carried_and_starts_at_zero(backbone):
     assert np.abs(both["hidden_raw"].curve[3:5] - tail["hidden_raw"].curve[:2]).min() > 1e-4
 
 
+def test_a_state_that_is_reset_makes_every_window_a_stream_of_its_own(backbone):
+    real, simulated = torch.randint(0, 4, (2, 8, 4, 16, 24)).to(torch.uint8)
+    ways = [Reading(definition=replace(BASE, warmup_windows=0, state="reset"))]
+    (both,) = score_streams(backbone, real, [simulated], ways, chunk_windows=3)
+    for index in range(8):
+        part = slice(index, index + 1)
+        (alone,) = score_streams(backbone, real[part], [simulated[part]], ways)
+        assert both["hidden_raw"].curve[index] == pytest.approx(alone["hidden_raw"].score, abs=1e-6)
+
+
+def test_a_grid_compares_parts_of_the_map(backbone):
+    real, simulated = torch.randint(0, 4, (2, 4, 4, 16, 24)).to(torch.uint8)
+    ways = [Reading(definition=replace(BASE, warmup_windows=0, patch="grid", patch_size=2))]
+    (scores,) = score_streams(backbone, real, [simulated], ways)
+    maps, _ = backbone.taps(torch.stack([real, simulated], dim=1).float(), None)
+    by_stage = []
+    for stage in maps["hidden"]:  # 8x12, 4x6 and 2x3 cells: the last has three columns in two parts
+        half = -(-stage.shape[-1] // 2)
+        rows = stage.unflatten(-2, (2, -1)).mean(dim=-2)
+        parts = torch.stack([rows[..., :half].mean(-1), rows[..., -half:].mean(-1)], dim=-1)
+        by_stage.append(patch_cosine(parts[:, 0], parts[:, 1]).mean().item())
+    assert scores["hidden_raw"].by_stage == pytest.approx(by_stage, abs=1e-6)
+    assert scores["hidden_raw"].map.shape == (2, 2)
+    assert scores["hidden_raw"].patch_px is None
+
+
+def test_a_mask_leaves_out_what_is_silent_in_both(backbone):
+    real, simulated = torch.randint(1, 4, (2, 4, 4, 24, 48)).to(torch.uint8)
+    for stream in (real, simulated):
+        stream[..., 24:] = 0  # patches of the coarsest stage are 24 pixels wide
+        stream[2] = 0
+    ways = [Reading(definition=replace(BASE, warmup_windows=0, mask="active", state="reset"))]
+    (scores,) = score_streams(backbone, real, [simulated], ways)
+    halves = [stream[[0, 1, 3], ..., :24] for stream in (real, simulated)]
+    unmasked = [Reading(definition=replace(BASE, warmup_windows=0, state="reset"))]
+    (expected,) = score_streams(backbone, halves[0], [halves[1]], unmasked)
+    found, wanted = scores["hidden_raw"], expected["hidden_raw"]
+    assert found.score == pytest.approx(wanted.score, abs=1e-6)
+    assert np.isnan(found.curve).tolist() == [False, False, True, False]
+    np.testing.assert_allclose(found.map[:, : found.map.shape[1] // 2], wanted.map, atol=1e-6)
+    assert np.isnan(found.map[:, found.map.shape[1] // 2 :]).all()
+
+
+def test_silence_equals_silence_under_a_mask(backbone):
+    blank = torch.zeros(4, 4, 16, 24, dtype=torch.uint8)
+    ways = [Reading(definition=replace(BASE, mask="active"))]
+    (scores,) = score_streams(backbone, blank, [blank], ways)
+    assert scores["hidden_raw"].score == 1
+
+
 def test_map_points_at_the_damage(backbone, make_events):
     real = make_events(1, height=48, width=48, count=30_000)
     broken = (real.x >= 24) & (real.y < 24)

@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from eqs.metrics import combine_maps, mean_over_stages, patch_cosine, pool_patches
+from eqs.metrics import combine_maps, mean_over_stages, patch_cosine, pool_grid, pool_patches
 
 
 def vectors(*columns):
@@ -109,3 +109,9 @@ def test_maps_of_all_stages_land_on_the_pixels_they_cover():
 def test_empty_patches_are_refused():
     with pytest.raises(ValueError, match="at least one cell, got 0; set patch_size"):
         pool_patches(torch.zeros(1, 2, 2), 0)
+
+
+def test_a_grid_averages_equal_parts():
+    maps = torch.arange(2 * 6 * 9.0).view(2, 6, 9)
+    found = pool_grid(maps, 3)
+    torch.testing.assert_close(found, maps.unflatten(2, (3, 3)).unflatten(1, (3, 2)).mean((2, 4)))
