@@ -98,8 +98,8 @@ def figure(width: float, height: float) -> Figure:
 
 
 def colours(systems: Iterable[str]) -> dict[str, str]:
-    """One colour per system in order of appearance; black for the real sensor."""
-    others = [name for name in dict.fromkeys(systems) if name != REFERENCE]
+    """One colour per system, whatever the order they come in; black for the real sensor."""
+    others = sorted({*systems} - {REFERENCE})
     drawn = {name: PALETTE[at % len(PALETTE)] for at, name in enumerate(others)}
     return {**drawn, REFERENCE: REAL_COLOUR}
 
