@@ -33,6 +33,13 @@ class PowerCut(Callback):
             raise Interrupted
 
 
+class PowerCutBetween(Callback):
+    """Stops the training after the first epoch's checkpoint, before the second epoch."""
+
+    def on_train_epoch_end(self, *_):
+        raise Interrupted
+
+
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("study")
@@ -86,17 +93,19 @@ def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, dict]) -
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", [PowerCut, PowerCutBetween])
 def test_an_interrupted_run_ends_with_the_same_numbers(
-    place: Path, trained: dict[str, dict]
+    place: Path, trained: dict[str, dict], kind: type[Callback]
 ) -> None:
-    elsewhere = [f"paths.runs={place / 'interrupted'}", "sim=esim", "ckpt_path=last"]
-    cut = configured(place, *elsewhere)
-    with open_dict(cut):
-        cut.callbacks = {"cut": {"_target_": f"{__name__}.PowerCut"}}
+    elsewhere = [f"paths.runs={place / kind.__name__}", "sim=esim", "ckpt_path=last"]
+    cut, again = (configured(place, *elsewhere) for _ in range(2))
+    with open_dict(cut), open_dict(again):
+        cut.callbacks = {"cut": {"_target_": f"{__name__}.{kind.__name__}"}}
+        again.callbacks = {"lines": {"_target_": "eqs.tasks.EpochLines", "label": "esim"}}
     with pytest.raises(Interrupted):
         train(cut)
-    assert not list(finished_runs(place / "interrupted/dsec_mini_smoke"))
-    result = train(configured(place, *elsewhere))
+    assert not list(finished_runs(place / kind.__name__ / "dsec_mini_smoke"))
+    result = train(again)
     for stream in ("own", "real"):
         assert result[stream] == trained["esim"][stream]
 
@@ -132,6 +141,7 @@ def test_detections_are_filmed(
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*LeafSpec.*:FutureWarning", "ignore:.*many workers")
 def test_the_reverse_mAP_of_real_events_is_the_forward_one(
     place: Path, trained: dict[str, dict]
 ) -> None:
