@@ -84,7 +84,12 @@ def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]
 
 def build_trainer(cfg: DictConfig, run: Run) -> lightning.Trainer:
     """The configured trainer, writing into the run's folder."""
-    last = ModelCheckpoint(run.checkpoints, filename="last", enable_version_counter=False)
+    last = ModelCheckpoint(
+        run.checkpoints,
+        filename="last",
+        save_on_train_epoch_end=True,  # every epoch's, not only those that end in a validation
+        enable_version_counter=False,
+    )
     best = ModelCheckpoint(
         run.checkpoints,
         filename="best",

@@ -30,9 +30,7 @@ class EpochLines(ProgressBar):
         self._start, self._first_epoch = time.perf_counter(), trainer.current_epoch
 
     def on_train_epoch_end(self, trainer: lightning.Trainer, *_: object) -> None:
-        """Log one line, unless the training resumed just here, after the epoch's last step."""
-        if "loss" not in trainer.callback_metrics:
-            return
+        """Log one line."""
         done, last = trainer.current_epoch + 1, trainer.max_epochs or 0
         each = (time.perf_counter() - self._start) / (done - self._first_epoch)
         values = trainer.callback_metrics
