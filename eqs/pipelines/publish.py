@@ -144,9 +144,9 @@ def draw_scene(folder: Path, found: Findings, protocol: LabelProtocol) -> dict[s
     place = f"Recording {shown.recording.name}, frame {shown.index}."
     sources = {"real": RecordedEvents(), **found.systems}
     streams = around(shown, sources)
-    start, stop = shown.stop_us - RATE_SPAN_US, shown.stop_us
+    times, stop = shown.recording.frame_times_us, shown.stop_us
+    start = max(int(times[0]), stop - RATE_SPAN_US)
     rates = {name: event_rate(each, start, stop, RATE_BIN_US) for name, each in streams.items()}
-    times = shown.recording.frame_times_us
     ticks = times[(times >= start) & (times <= stop)] - start
     drawn = {
         "events": events_panels(
