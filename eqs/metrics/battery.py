@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 from eqs.events import Events
 from eqs.metrics import corruptions as damage
 
-# What a person expects, best first: a score that disagrees reacts to something else.
+# What a person expects, best first: a score that disagrees reacts to something else. Whether ten
+# milliseconds of jitter are worse than half of the events lost, nobody can say beforehand.
 EXPECTED_ORDER: Final = (
     "identical",
     "ceiling",
     "thinned_50",
-    "jitter_10ms",
-    "shuffled",
     "frame_locked",
     "chance",
     "blank",

@@ -34,17 +34,16 @@ def print_eqs(eqs: pd.DataFrame, console: Console) -> None:
 def print_sanity(
     table: pd.DataFrame, headline: str, expected: Sequence[str], console: Console
 ) -> None:
-    """Print what every reading makes of the damaged streams, and where it disagrees."""
-    names = [headline, *(name for name in readings(table) if name != headline)]
+    """Print what the headline makes of the damaged streams, and where each reading disagrees."""
     rows = tuple(
         (
             str(row["corruption"]) + ("" if pd.isna(row["severity"]) else f" {row['severity']:g}"),
-            *(number(row[name]) for name in names),
+            number(row[headline]),
         )
         for row in table.to_dict("records")
     )
-    console.print(_drawn(Table(header=("corruption", *names), rows=rows), "Sanity battery"))
-    for name in names:
+    console.print(_drawn(Table(header=("corruption", headline), rows=rows), "Sanity battery"))
+    for name in [headline, *(name for name in readings(table) if name != headline)]:
         faults = order_faults(table, name, expected)
         verdict = "as expected" if not faults else "not as expected, " + ", ".join(faults)
         console.print(f"[bold]{name}[/bold]: order {verdict}")
