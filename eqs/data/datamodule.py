@@ -179,9 +179,18 @@ class EventDataModule(lightning.LightningDataModule):
     def evaluation_dataset(
         self, split: str, events: EventPaths, rank: int = 0, world_size: int = 1
     ) -> EvaluationDataset:
-        """Every window of a split, or of one process's share of its recordings."""
-        sources = self.sources(split, events)[rank::world_size]
-        return EvaluationDataset(sources, chunk_length=self.evaluation_length)
+        """Every window of a split, or of one process's share of its recordings.
+
+        Raises:
+            ValueError: there are fewer recordings than processes, or they differ in size.
+        """
+        sources = self.sources(split, events)
+        if 0 < len(sources) < world_size:  # idle processes would leave the others waiting
+            raise ValueError(
+                f"Expected a {split} recording for each of {world_size} processes, got "
+                f"{len(sources)}; set trainer.devices or data.splits"
+            )
+        return EvaluationDataset(sources[rank::world_size], chunk_length=self.evaluation_length)
 
     def sources(self, split: str, events: EventPaths) -> list[WindowSource]:
         """The recordings of a split with the events of one source."""

@@ -24,6 +24,15 @@ class EpochLines(ProgressBar):
         self.label = label
         self._start = 0.0
         self._first_epoch = 0
+        self._speaks = True
+
+    def disable(self) -> None:
+        """Be silent, as every process but the first is told to be."""
+        self._speaks = False
+
+    def enable(self) -> None:
+        """Speak again."""
+        self._speaks = True
 
     def on_train_start(self, trainer: lightning.Trainer, *_: object) -> None:
         """Start the clock, at the epoch from which the training goes on."""
@@ -31,6 +40,8 @@ class EpochLines(ProgressBar):
 
     def on_train_epoch_end(self, trainer: lightning.Trainer, *_: object) -> None:
         """Log one line."""
+        if not self._speaks:
+            return
         done, last = trainer.current_epoch + 1, trainer.max_epochs or 0
         each = (time.perf_counter() - self._start) / (done - self._first_epoch)
         values = trainer.callback_metrics

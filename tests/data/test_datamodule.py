@@ -112,6 +112,11 @@ def test_processes_share_the_recordings(module):
     assert names == [["test_a"], ["test_b"]]
 
 
+def test_no_process_may_be_left_without_a_recording(module):
+    with pytest.raises(ValueError, match=r"for each of 3 processes, got 2; set trainer\.devices"):
+        module().evaluation_dataset("test", RecordedEvents(), 0, 3)
+
+
 class Recorder(lightning.LightningModule):
     """Notes the content of every training batch, and may be interrupted."""
 
