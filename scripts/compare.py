@@ -6,6 +6,7 @@ compare.py runs/dsec_mini/real/* --curve curve.png
 import argparse
 import sys
 from pathlib import Path
+from textwrap import shorten
 
 from omegaconf import OmegaConf
 from rich.console import Console
@@ -70,13 +71,15 @@ def main() -> None:
             if own.get(name) != first.get(name)
         ]
         result = run.result()
-        names.append(", ".join([f"{result['system']} seed {result['seed']}", *changed]))
+        place = f"{len(names) + 1}: {result['system']} seed {result['seed']}"
+        names.append(", ".join([place, *changed]))
         real = result["real"]
         minutes = f"{result['seconds'] / 60:.1f}"
         table.add_row(names[-1], f"{100 * real['map']:.1f}", f"{100 * real['map_50']:.1f}", minutes)
     Console().print(table)
     if given.curve:
-        figure = learning_curves({n: curve(run) for n, run in zip(names, runs, strict=True)})
+        labels = [shorten(name, 60, placeholder=" ...") for name in names]
+        figure = learning_curves({n: curve(run) for n, run in zip(labels, runs, strict=True)})
         save_figure(figure, given.curve.parent, given.curve.stem)
 
 
