@@ -19,7 +19,7 @@ from eqs.metrics.windows import chunk_length
 
 STAGES: Final = (1, 2, 3)
 EVENTS_PER_SECOND: Final = 1_000_000
-MOST_IN_MEMORY: Final = 60  # windows of histograms; the ratio is one of times per window
+MOST_IN_MEMORY: Final = 16  # windows of histograms; the ratio is one of times per window
 
 
 @dataclass(frozen=True)
