@@ -63,7 +63,7 @@ def main() -> None:
     every = [settings(run) for run in runs]
     first = every[0]
     table = Table("training, and where it differs from the first", "mAP", "AP50", "minutes")
-    names = []
+    names: list[str] = []
     for run, own in zip(runs, every, strict=True):
         changed = [
             f"{name}={own.get(name)}"
