@@ -133,4 +133,4 @@ def print_table(windows: int, width: int, height: int) -> None:
         base = base or each
         numbers = (cost.seconds, 1e3 * each, cost.peak_mib, each / base)
         table.add_row(shown, str(count), *(f"{value:.2f}" for value in numbers))
-    Console().print(table)
+    Console(width=max(Console().width, 110)).print(table)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from numpy.typing import ArrayLike
 
@@ -98,32 +98,13 @@ def anchors(
     return made
 
 
-def singles(
-    real: Events,
-    *,
-    other: Events | None = None,
-    frame_times_us: ArrayLike | None = None,
-    window_us: int = 50_000,
-    start_us: int | None = None,
-    stop_us: int | None = None,
-    seed: int = 0,
-    key: str = "",
-) -> dict[str, Events]:
+def singles(real: Events, *, seed: int = 0, key: str = "", **given: Any) -> dict[str, Events]:  # noqa: ANN401
     """The anchors and, beside them, every other corruption of the sanity battery.
 
     Arguments and errors as for `anchors`.
     """
     jittered = partial(damage.jittered_in_time, real, seed=seed, key=key)
-    known = anchors(
-        real,
-        other=other,
-        frame_times_us=frame_times_us,
-        window_us=window_us,
-        start_us=start_us,
-        stop_us=stop_us,
-        seed=seed,
-        key=key,
-    )
+    known = anchors(real, seed=seed, key=key, **given)
     return {
         **known,
         "jitter_0.1ms": jittered(100),
