@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from torch import Tensor
 
 from eqs.benchmarks import plain_rvt
+from eqs.benchmarks.simulators import PERIOD_US, draw_clip
 from eqs.benchmarks.timing import Cost, in_own_process, time_runs
-from eqs.events import Events
+from eqs.data.histogram_cache import cached_histogram
+from eqs.events import EventReader, Events
 from eqs.models import RVTDetector
 from eqs.models.loss import detection_loss
 from eqs.models.yolox_head import decode_boxes
 from eqs.representations import stacked_histogram
+from eqs.simulators import ESIM
 
 CLASSES: Final = 3
 OBJECTS: Final = 8  # rows of labels per frame, half of them padding
@@ -32,12 +38,13 @@ class Job:
     """One line of the table, computed one of the two ways.
 
     Args:
-        what: inference, training, loss or histogram.
+        what: inference, training, loss, histogram or stored window.
         plain: one time step after the other instead of the fast path.
         size: rows and columns.
         steps: time steps of one run.
         batch: samples side by side.
         half: compute in bfloat16 where autocast does.
+        folder: where a job that needs files may put them.
     """
 
     what: str
@@ -46,6 +53,7 @@ class Job:
     steps: int = 1
     batch: int = 1
     half: bool = False
+    folder: Path = Path()
 
     @property
     def frames(self) -> int:
@@ -64,13 +72,15 @@ LINES: Final = (
     ),
     Job("loss", steps=STEPS, batch=8),
     Job("histogram", size=(480, 640)),
+    Job("stored window", size=(480, 640)),
 )
 
 
 def measure(job: Job) -> Cost:
     """What one run of `job` costs, once everything is set up."""
     torch.manual_seed(0)
-    return time_runs(SET_UP[job.what](job))
+    with tempfile.TemporaryDirectory() as folder:
+        return time_runs(SET_UP[job.what](replace(job, folder=Path(folder))))
 
 
 def event_tensors(job: Job) -> Tensor:
@@ -163,11 +173,30 @@ def histogram(job: Job) -> Callable[[], object]:
     return lambda: stacked_histogram(events, 10, 0, 50_000)
 
 
+def stored_window(job: Job) -> Callable[[], object]:
+    """A window of a drifting picture from disk: its events to be binned, or its histogram."""
+    clip, times_us = draw_clip(3, *job.size), PERIOD_US * np.arange(3)
+    events = ESIM(threshold_on_log=0.03, threshold_off_log=0.03).simulate(clip, times_us)
+    events.save(job.folder / "events.h5")
+    reader = EventReader(job.folder / "events.h5")
+
+    def binned() -> NDArray[np.uint8]:
+        return stacked_histogram(reader.window(0, PERIOD_US), 10, 0, PERIOD_US)
+
+    shape = binned().shape
+
+    def stored() -> NDArray[np.uint8]:
+        return cached_histogram(job.folder / "0.h5", binned, shape)
+
+    return binned if job.plain else stored
+
+
 SET_UP: Final = {
     "inference": inference,
     "training": training,
     "loss": loss,
     "histogram": histogram,
+    "stored window": stored_window,
 }
 
 

@@ -98,6 +98,7 @@ class EventDataModule(lightning.LightningDataModule):
         bins: time bins per polarity.
         window_us: length of a window.
         count_cutoff: a count stops growing here.
+        histogram_cache: folder that keeps histograms once they are binned; None for none.
         evaluation_length: windows per evaluation item; results do not depend on it.
         num_workers: processes that read beside the training; batches do not depend on it.
 
@@ -122,6 +123,7 @@ class EventDataModule(lightning.LightningDataModule):
         bins: int = 10,
         window_us: int = 50_000,
         count_cutoff: int = 10,
+        histogram_cache: Path | str | None = None,
         evaluation_length: int = 10,
         num_workers: int = 0,
     ) -> None:
@@ -140,6 +142,7 @@ class EventDataModule(lightning.LightningDataModule):
         check_whole_numbers({"datamodule.num_workers": num_workers, "seed": seed}, least=0)
         self.dataset, self.protocol, self.source, self.tests = dataset, protocol, source, tests
         self.binning = Binning(bins=bins, window_us=window_us, count_cutoff=count_cutoff)
+        self.histogram_cache = None if histogram_cache is None else Path(histogram_cache)
         self.seed, self.batch_size, self.sequence_length = seed, batch_size, sequence_length
         self.steps_per_epoch, self.epochs = steps_per_epoch, epochs
         self.stream_share, self.augmentation = stream_share, augmentation
@@ -200,6 +203,7 @@ class EventDataModule(lightning.LightningDataModule):
                 events_path=events.path(recording),
                 protocol=self.protocol,
                 binning=self.binning,
+                cache=self.histogram_cache,
             )
             for recording in self.dataset.recordings(split)
         ]

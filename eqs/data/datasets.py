@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import asdict, dataclass, field
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,13 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from eqs.data.augment import Augmentation, View, visible
+from eqs.data.histogram_cache import cached_histogram
 from eqs.data.labels import LabelProtocol, detector_rows
 from eqs.data.recording import Recording
 from eqs.data.sampling import Chunk, Schedule, keyed_generator
 from eqs.data.windows import detection_windows
 from eqs.events import EventReader
+from eqs.files import short_hash
 from eqs.representations import stacked_histogram
 
 Batch = dict[str, Tensor]
@@ -51,12 +53,14 @@ class WindowSource:
         events_path: the events to look at, recorded or simulated.
         protocol: which boxes count.
         binning: how windows become histograms.
+        cache: folder that keeps the histograms; None to bin the events at every use.
     """
 
     recording: Recording
     events_path: Path
     protocol: LabelProtocol
     binning: Binning = field(default_factory=Binning)
+    cache: Path | None = None
     windows_us: NDArray[np.int64] = field(init=False, repr=False)
     reader: EventReader = field(init=False, repr=False)
 
@@ -85,6 +89,22 @@ class WindowSource:
 
     def histogram(self, index: int) -> NDArray[np.uint8]:
         """The histogram of one window, uint8, shape `self.shape`."""
+        if self._kept is None:
+            return self._binned(index)
+        path = self._kept / f"{self.windows_us[index, 1]}.h5"
+        return cached_histogram(path, partial(self._binned, index), self.shape)
+
+    @cached_property
+    def _kept(self) -> Path | None:
+        """Where the histograms of these very events lie, binned this way."""
+        if self.cache is None:
+            return None
+        file = self.events_path.stat()
+        events = [str(self.events_path.resolve()), file.st_size, file.st_mtime_ns]
+        key = short_hash([events, asdict(self.binning), self.shape])
+        return self.cache / f"{self.recording.name}-{key}"
+
+    def _binned(self, index: int) -> NDArray[np.uint8]:
         start_us, stop_us = (int(time) for time in self.windows_us[index])
         return stacked_histogram(
             self.reader.window(start_us, stop_us),

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+
 import torch
 from omegaconf import OmegaConf
+
+MOST_WORKERS = 8
 
 
 def precision(device: str) -> str:
@@ -20,8 +24,18 @@ def precision(device: str) -> str:
     return "bf16-mixed" if torch.cpu.get_capabilities().get("avx512_bf16") else "32-true"
 
 
+def workers() -> int:
+    """Processes that should read beside a training.
+
+    A GPU must not wait for one process that decompresses and bins; without one, readers would take
+    the cores from the training.
+    """
+    return min(MOST_WORKERS, os.cpu_count() or 1) if torch.cuda.is_available() else 0
+
+
 def register_resolvers() -> None:
     """Make the resolvers known to OmegaConf; may be called again."""
     OmegaConf.register_new_resolver("precision", precision, replace=True)
+    OmegaConf.register_new_resolver("workers", workers, replace=True)
     OmegaConf.register_new_resolver("length", len, replace=True)
     OmegaConf.register_new_resolver("multiply", lambda a, b: a * b, replace=True)

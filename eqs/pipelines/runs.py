@@ -15,7 +15,7 @@ from eqs.files import read_json, short_hash, write_json
 # What makes two detectors comparable: everything a training depends on but stream and seed ...
 RECIPE_KEYS = ("data", "protocol", "model", "recipe", "datamodule", "task")
 # ... and nothing that only says where files lie or how many processes read them.
-INCIDENTAL = {"data": {"root", "workers"}, "datamodule": {"seed", "num_workers"}}
+INCIDENTAL = {"data": {"root", "workers"}, "datamodule": {"seed", "num_workers", "histogram_cache"}}
 RESULT_KEYS = {"simulator", "system", "seed", "recipe", "own", "real", "protocol"}
 
 

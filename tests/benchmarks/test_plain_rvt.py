@@ -1,10 +1,13 @@
 """The plain path is the same function as the fast one, or comparing their times means nothing."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 import torch
 
 from eqs.benchmarks import plain_rvt
-from eqs.benchmarks.rvt import Job, event_tensors, histogram, labels_of, training
+from eqs.benchmarks.rvt import Job, event_tensors, histogram, labels_of, stored_window, training
 from eqs.models import RVTDetector
 from eqs.models.loss import detection_loss
 from eqs.models.yolox_head import anchor_grid, decode_boxes
@@ -54,6 +57,13 @@ def test_histograms_agree():
     plain = histogram(Job("histogram", plain=True, size=(24, 32)))()
     # The published bins divide the time between first and last event, in float32: a few differ.
     assert (torch.from_numpy(fast) != plain).float().mean() < 0.05
+
+
+def test_stored_windows_agree(tmp_path):
+    job = Job("stored window", size=(24, 32), folder=tmp_path)
+    binned, stored = stored_window(replace(job, plain=True)), stored_window(job)
+    for _ in range(2):  # made, then read
+        np.testing.assert_array_equal(stored(), binned())
 
 
 @pytest.mark.parametrize("plain", [True, False])

@@ -32,13 +32,14 @@ def recordings(tmp_path_factory, make_recording):
     ]
 
 
-def sources_of(recordings, protocol=PROTOCOL, **binning):
+def sources_of(recordings, protocol=PROTOCOL, cache=None, **binning):
     return [
         WindowSource(
             recording=recording,
             events_path=recording.events_path,
             protocol=protocol,
             binning=Binning(**{"bins": 3, **binning}),
+            cache=cache,
         )
         for recording in recordings
     ]
@@ -100,6 +101,35 @@ def test_frames_without_boxes_count_only_where_labels_are_exhaustive(recordings)
         assert len(source.labelled_windows()) == expected
         batches = list(iterate(EvaluationDataset([source])))
         assert sum(int(batch["labelled"].sum()) for batch in batches) == expected
+
+
+def histograms_of(sources):
+    return [source.histogram(index) for source in sources for index in range(len(source))]
+
+
+def test_histograms_are_binned_once_and_read_again(recordings, tmp_path, monkeypatch):
+    plain = histograms_of(sources_of(recordings))
+    first = histograms_of(sources_of(recordings, cache=tmp_path))
+    monkeypatch.setattr(WindowSource, "_binned", lambda *_: pytest.fail("binned again"))
+    again = histograms_of(sources_of(recordings, cache=tmp_path))
+    assert len(list(tmp_path.glob("*/*.h5"))) == len(plain) == 16
+    for kept in (first, again):
+        assert all(np.array_equal(a, b) for a, b in zip(plain, kept, strict=True))
+
+
+def test_other_events_or_bins_are_not_taken_from_the_cache(recordings, tmp_path, make_recording):
+    recording = Recording.load(make_recording(tmp_path / "data" / "a", frames=4, seed=8))
+    cache = tmp_path / "cache"
+    before = histograms_of(sources_of([recording], cache=cache))
+    fewer = histograms_of(sources_of([recording], cache=cache, bins=2))
+    capped = histograms_of(sources_of([recording], cache=cache, count_cutoff=1))
+    Events.load(recording.events_path).shifted(10_000).save(recording.events_path)
+    after = histograms_of(sources_of([recording], cache=cache))
+    plain = histograms_of(sources_of([recording]))
+    assert fewer[0].shape[0] == 4
+    assert max(each.max() for each in capped) == 1
+    assert not all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(plain, after, strict=True))
 
 
 def iterate(dataset):

@@ -54,7 +54,15 @@ def test_whatever_makes_detectors_incomparable_changes_the_recipe(change: str) -
 
 
 def test_where_files_lie_does_not_change_the_recipe() -> None:
-    assert recipe_hash(composed("paths.datasets=elsewhere")) == recipe_hash(composed())
+    elsewhere = composed("paths.datasets=elsewhere", "datamodule.histogram_cache=there")
+    assert recipe_hash(elsewhere) == recipe_hash(composed())
+
+
+def test_readers_help_a_gpu_and_leave_a_cpu_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: 3)
+    for there, readers in ((False, 0), (True, 3)):
+        monkeypatch.setattr("torch.cuda.is_available", lambda there=there: there)
+        assert composed().datamodule.num_workers == readers
 
 
 def test_only_finished_runs_are_found(tmp_path: Path) -> None:
