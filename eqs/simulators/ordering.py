@@ -60,7 +60,7 @@ def _radix_sorted(keys: NDArray[np.int64], base: int, lowest_bit: int) -> NDArra
         largest = max(largest, key - base)
     source, target = keys, np.empty_like(keys)
     shift = lowest_bit
-    while largest >> shift:
+    while shift < 63 and largest >> shift:  # a shift by all bits does not give zero
         counts = np.zeros((1 << _DIGIT_BITS) + 1, np.int64)
         for key in source:
             counts[(((key - base) >> shift) & _DIGIT_MASK) + 1] += 1

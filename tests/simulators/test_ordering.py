@@ -33,7 +33,7 @@ def test_keys_survive_the_extremes():
 
 
 @pytest.mark.parametrize("raster", [True, False])
-@pytest.mark.parametrize("span", [1, 200, 50_000, 20_000_000])
+@pytest.mark.parametrize("span", [1, 200, 50_000, 20_000_000, MAX_TIME_US - 1000])
 def test_sorting_is_by_time_and_pixel_and_keeps_the_order_of_equals(raster, span):
     generator = np.random.default_rng(0)
     times, pixels = generator.integers(1000, 1000 + span, 3000), generator.integers(0, 300, 3000)
