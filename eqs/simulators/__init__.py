@@ -9,6 +9,7 @@ from eqs.simulators.icns import ICNS
 from eqs.simulators.improved_esim import ImprovedESIM
 from eqs.simulators.pix2nvs import PIX2NVS
 from eqs.simulators.prophesee import Prophesee
+from eqs.simulators.readout import Bottleneck, Readout, RowReadout, SynchronousReadout
 from eqs.simulators.stream import Stream
 from eqs.simulators.v2e import V2E
 from eqs.simulators.vid2e import Vid2E
@@ -19,12 +20,16 @@ __all__ = [
     "ICNS",
     "PIX2NVS",
     "V2E",
+    "Bottleneck",
     "DVSVoltmeter",
     "Gazebo",
     "ImprovedESIM",
     "Prophesee",
+    "Readout",
     "Recorded",
+    "RowReadout",
     "Simulator",
     "Stream",
+    "SynchronousReadout",
     "Vid2E",
 ]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from eqs.events import Events
 from eqs.frames import GreyImage, Interpolation
+from eqs.simulators.readout import Readout
 from eqs.simulators.stream import Pixels, Stream
 
 MODES = ("fixed", "faithful")
@@ -30,6 +31,7 @@ class Simulator(ABC):
     Args:
         mode: `fixed` mends the defects of the published program, `faithful` keeps them.
         interpolation: makes frames between those of the clip, which the model then sees as well.
+        readout: makes the events wait until the sensor can send them; None sends them at once.
 
     Raises:
         ValueError: a parameter lies outside its range.
@@ -43,6 +45,7 @@ class Simulator(ABC):
 
     mode: str = "fixed"
     interpolation: Interpolation | None = None
+    readout: Readout | None = None
 
     def __post_init__(self) -> None:
         """Check the parameters every simulator has."""
@@ -59,12 +62,12 @@ class Simulator(ABC):
         """The pixels after the first frame of a sequence."""
 
     def parameters(self) -> dict[str, Any]:
-        """Everything that changes the events; seed and interpolation only where they do."""
+        """Everything that changes the events; what is not used is left out."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        if self.interpolation is None:
-            del values["interpolation"]
-        else:
-            values["interpolation"] = self.interpolation.parameters()
+        for name in ("interpolation", "readout"):
+            part = values.pop(name)
+            if part is not None:
+                values[name] = part.parameters()
         if not self.stochastic:
             values.pop("seed", None)
         return values

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from eqs.events import Events
 from eqs.frames import GreyImage, checked_frames, checked_times
 from eqs.simulators.ordering import MAX_PIXELS, MAX_TIME_US, ReorderBuffer, events_of, ordered
+from eqs.simulators.readout import WaitingEvents
 
 if TYPE_CHECKING:
     from eqs.simulators.base import Simulator
@@ -57,6 +58,7 @@ class Stream:
         self.sequence = sequence
         self._pixels: Pixels | None = None
         self._buffer = ReorderBuffer()
+        self._waiting: WaitingEvents | None = None
         self._frames_seen = 0
         self._last_frame: NDArray[Any] | None = None
         self._origin_us = 0
@@ -105,7 +107,7 @@ class Stream:
         """End the sequence and give the events that were held back.
 
         Raises:
-            ValueError: fewer than two frames were seen.
+            ValueError: fewer than two frames were seen, or the readout is far too slow.
         """
         if self._frames_seen < 2:
             raise ValueError(
@@ -113,7 +115,8 @@ class Stream:
                 "between frames"
             )
         self._finished = True
-        return self._events(self._buffer.flush())
+        keys = self._buffer.flush()
+        return self._events(keys if self._waiting is None else self._waiting.flush(keys))
 
     def _events(self, keys: NDArray[np.int64]) -> Events:
         height, width = self._size
@@ -151,6 +154,8 @@ class Stream:
         if self._pixels is None:
             self._origin_us = self._last_us = time_us
             self._pixels = self.simulator.begin(image, self.sequence)
+            if self.simulator.readout is not None:
+                self._waiting = WaitingEvents(self.simulator.readout, self._size)
             return np.empty(0, np.int64), Interval(0, 0, 0)
         interval = Interval(index, self._last_us - self._origin_us, time_us - self._origin_us)
         self._last_us = time_us
@@ -159,4 +164,7 @@ class Stream:
     def _released(self, keys: NDArray[np.int64], interval: Interval) -> Events:
         """The events that the end of an interval makes final."""
         keys = ordered(keys, interval.start_us)
-        return self._events(self._buffer.push(keys, interval.stop_us))
+        keys = self._buffer.push(keys, interval.stop_us)
+        if self._waiting is not None:
+            keys = self._waiting.push(keys, interval.stop_us)
+        return self._events(keys)

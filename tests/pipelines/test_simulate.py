@@ -45,6 +45,17 @@ def test_the_file_holds_what_the_simulator_gives(clip, tmp_path):
         np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
 
 
+def test_a_readout_holds_the_events_back(clip, tmp_path):
+    folder, _ = clip
+    rate = "frames_per_second=100"
+    run(folder, tmp_path / "all.h5", rate)
+    run(folder, tmp_path / "slow.h5", rate, "readout=bottleneck", "readout.service_us=60")
+    arisen, left = Events.load(tmp_path / "all.h5"), Events.load(tmp_path / "slow.h5")
+    assert len(left) == len(arisen)
+    assert np.diff(arisen.t).min() == 0
+    assert np.diff(left.t).min() == 60
+
+
 def test_times_beside_the_folder_are_taken(clip, tmp_path):
     folder, _ = clip
     times = 7_000_000 + 33_333 * np.arange(20)

@@ -15,11 +15,14 @@ from eqs.simulators import (
     ICNS,
     PIX2NVS,
     V2E,
+    Bottleneck,
     DVSVoltmeter,
     Gazebo,
     ImprovedESIM,
     Prophesee,
     Recorded,
+    RowReadout,
+    SynchronousReadout,
     Vid2E,
 )
 
@@ -37,6 +40,7 @@ SIMULATORS = {
     "real": Recorded,
     "vid2e": Vid2E,
 }
+READOUTS = {"bottleneck": Bottleneck, "row": RowReadout, "synchronous": SynchronousReadout}
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
 
 CHANGED = (
@@ -72,8 +76,9 @@ def test_a_parameter_file_has_exactly_the_defaults(name):
     expected = {field.name: field.default for field in fields(kind)}
     if "seed" in expected:
         expected["seed"] = "${seed}"
-    if "interpolation" in expected:
-        expected["interpolation"] = "${oc.select:interpolation,null}"
+    for group in ("interpolation", "readout"):
+        if group in expected:
+            expected[group] = f"${{oc.select:{group},null}}"
     assert values == expected
     assert {key: type(value) for key, value in values.items()} == {
         key: type(value) for key, value in expected.items()
@@ -88,6 +93,35 @@ def test_every_parameter_has_a_comment_with_source_and_range(name):
             assert above.startswith("# "), line
             assert "Source: " in above, line
             assert any(word in above for word in ("Typical ", "Range ", "One of ")), line
+
+
+@pytest.mark.parametrize("name", READOUTS)
+def test_a_readout_file_has_exactly_the_defaults_and_says_whence(name):
+    text = (CONFIGS / "readout" / f"{name}.yaml").read_text()
+    values = yaml.safe_load(text)["readout"]
+    assert values.pop("_target_") == f"eqs.simulators.{READOUTS[name].__name__}"
+    assert values == {field.name: field.default for field in fields(READOUTS[name])}
+    (source,) = [line for line in text.splitlines() if "Source: " in line]
+    assert "microseconds. " in source
+    assert "Typical " in source
+
+
+@pytest.mark.parametrize("program", ["simulate", "train", "calibrate"])
+def test_every_program_offers_every_readout(program):
+    names = {path.stem for path in (CONFIGS / "readout").glob("*.yaml")}
+    assert names == {*READOUTS, "none"}
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        for name in names:
+            cfg = compose(program, ["sim=icns", f"readout={name}"])
+            expected = ICNS(readout=READOUTS[name]() if name in READOUTS else None)
+            assert instantiate(cfg.sim) == expected
+
+
+def test_a_readout_holds_for_every_simulator_of_an_evaluation():
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("evaluate", ["readout=row", "readout.service_us=3"])
+    for simulator in cfg.simulators.values():
+        assert instantiate(simulator).readout == RowReadout(service_us=3)
 
 
 def test_every_simulator_has_a_parameter_file():
