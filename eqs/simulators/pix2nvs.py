@@ -125,23 +125,35 @@ class PIX2NVSPixels:
         first = log_luma(image.levels)[image.codes]
         self.reference = np.zeros_like(first) if self.update == _INTEGRATE else first
         self.threshold = np.full(first.size, float(model.threshold_log))
+        self.chosen = np.empty(first.size + 1, np.int32)
         self.keys = np.empty(first.size, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
         model = self.model
         fixed = model.mode == "fixed"
-        bounds = (model.threshold_min_log, model.threshold_max_log) if fixed else (0.0, math.inf)
-        self.keys, count = _fire_blocks(
+        smallest_log = model.threshold_min_log if fixed else 0.0
+        signal, adaptation = log_luma(image.levels), float(model.adaptation)
+        firing = _firing(
             image.codes,
-            log_luma(image.levels),
+            signal,
             self.reference,
             self.threshold,
-            bounds,
-            float(model.adaptation),
+            smallest_log,
+            adaptation,
+            (image.height, image.width, model.block),
+            self.chosen,
+        )
+        self.keys, count = _fire(
+            self.chosen[:firing],
+            image.codes,
+            signal,
+            self.reference,
+            self.threshold,
+            model.threshold_max_log if fixed else math.inf,
+            adaptation,
             self.update,
             model.max_events,
-            (image.height, image.width, model.block),
             # The program stamps one interval late, and rounds where we floor.
             interval.start_us if fixed else interval.stop_us,
             0.0 if fixed else 0.5,
@@ -172,47 +184,68 @@ def _strongest(
 
 
 @njit(cache=True, nogil=True)
-def _fire_blocks(
+def _firing(
     codes: NDArray[Any],
     signal: NDArray[np.float64],
     reference: NDArray[np.float64],
     threshold: NDArray[np.float64],
-    bounds: tuple[float, float],
+    smallest_log: float,
     adaptation: float,
-    update: int,
-    max_events: int,
     shape: tuple[int, int, int],
-    base_us: int,
-    rounding: float,
-    span_us: int,
-    keys: NDArray[np.int64],
-) -> Fired:
+    chosen: NDArray[np.int32],
+) -> int:
+    """Write the pixels that fire, the strongest of each block, to `chosen`; the others adapt."""
     height, width, block = shape
     count = 0
     for top in range(0, height, block):
         rows = (top, min(top + block, height))
         for left in range(0, width, block):
-            columns = (left, min(left + block, width))
             pixel = top * width + left
             if block > 1:
+                columns = (left, min(left + block, width))
                 pixel = _strongest(codes, signal, reference, rows, columns, width)
             limit = threshold[pixel]
-            difference = signal[codes[pixel]] - reference[pixel]
-            distance = abs(difference)
-            if distance <= limit:
-                threshold[pixel] = max(limit * (1.0 - adaptation), bounds[0])
-                continue
-            number = int(min(distance / limit, float(max_events)))
-            keys = with_room(keys, count + number)
-            for ordinal in range(1, number + 1):
-                offset_us = int(ordinal * limit / distance * span_us + rounding)
-                keys[count] = event_key(base_us + offset_us, pixel, 1 if difference > 0 else 0)
-                count += 1
-            if update == _REPLACE:
-                reference[pixel] = signal[codes[pixel]]
-            elif update == _INTEGRATE:
-                reference[pixel] += number * limit if difference > 0 else -number * limit
-            threshold[pixel] = min(limit * (1.0 + adaptation), bounds[1])
+            fires = abs(signal[codes[pixel]] - reference[pixel]) > limit
+            # Written in either case: a branch would cost more.
+            chosen[count] = pixel
+            count += fires
+            threshold[pixel] = limit if fires else max(limit * (1.0 - adaptation), smallest_log)
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _fire(
+    chosen: NDArray[np.int32],
+    codes: NDArray[Any],
+    signal: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    threshold: NDArray[np.float64],
+    largest_log: float,
+    adaptation: float,
+    update: int,
+    max_events: int,
+    base_us: int,
+    rounding: float,
+    span_us: int,
+    keys: NDArray[np.int64],
+) -> Fired:
+    """Fire the chosen pixels, which adapt the other way."""
+    count = 0
+    for pixel in chosen:
+        limit = threshold[pixel]
+        difference = signal[codes[pixel]] - reference[pixel]
+        distance = abs(difference)
+        number = int(min(distance / limit, float(max_events)))
+        keys = with_room(keys, count + number)
+        for ordinal in range(1, number + 1):
+            offset_us = int(ordinal * limit / distance * span_us + rounding)
+            keys[count] = event_key(base_us + offset_us, pixel, 1 if difference > 0 else 0)
+            count += 1
+        if update == _REPLACE:
+            reference[pixel] = signal[codes[pixel]]
+        elif update == _INTEGRATE:
+            reference[pixel] += number * limit if difference > 0 else -number * limit
+        threshold[pixel] = min(limit * (1.0 + adaptation), largest_log)
     if update == _PREVIOUS:
         for pixel in range(codes.size):
             reference[pixel] = signal[codes[pixel]]
