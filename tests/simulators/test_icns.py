@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from simulator_checks import assert_poisson, still
 
 from eqs.simulators import ICNS
@@ -70,6 +71,34 @@ def test_a_response_that_turns_round_is_found_on_both_sides():
     assert up
     assert rise == pytest.approx(np.argmax(path >= 2.0), abs=1)
     assert first_crossing(*arguments, 400.0, (-9.0, 9.0))[0] == math.inf
+
+
+def test_crossings_are_the_roots_of_the_response():
+    generator = np.random.default_rng(4)
+    found = 0
+    for _ in range(2000):
+        level, light = generator.normal(0, 0.3, 2)
+        slope, tau_us = generator.normal(0, 1e-4), 10 ** generator.uniform(0, 5)
+        arguments = level, light, slope, tau_us
+        bounds = level - generator.uniform(0.01, 0.5), level + generator.uniform(0.01, 0.5)
+        path = np.array([response(*arguments, wait) for wait in np.linspace(0, 5e4, 4001)])
+        outside = (path <= bounds[0]) | (path >= bounds[1])
+        wait_us, up = first_crossing(*arguments, 5e4, bounds)
+        if not outside.any():
+            assert wait_us == math.inf or response(*arguments, wait_us) == pytest.approx(
+                bounds[up], abs=1e-9
+            )
+            continue
+        first = outside.argmax()
+        assert up == (path[first] >= bounds[1])
+        expected = brentq(
+            lambda wait, arguments, bound: response(*arguments, wait) - bound,
+            *np.linspace(0, 5e4, 4001)[[first - 1, first]],
+            args=(arguments, bounds[up]),
+        )
+        assert wait_us == pytest.approx(expected, abs=1e-3)
+        found += 1
+    assert found > 500
 
 
 @pytest.mark.parametrize(("low", "high", "mended"), [(1000, 9000, 5), (10, 1000, 10)])
