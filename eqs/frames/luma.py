@@ -47,12 +47,14 @@ class GreyImage:
         levels: grey levels, 0..255, float64.
         height: rows.
         width: columns.
+        first_pixel: number of the first pixel on the sensor, where the image is a part of it.
     """
 
     codes: NDArray[Any]
     levels: NDArray[np.float64]
     height: int
     width: int
+    first_pixel: int = 0
 
     @classmethod
     def from_frame(cls, frame: NDArray[Any], rounded_luma: bool = True) -> GreyImage:
@@ -69,3 +71,23 @@ class GreyImage:
             return cls(grey.flatten(), GREY_LEVELS, height, width)
         codes = np.arange(grey.size, dtype=np.int32)
         return cls(codes, grey.astype(np.float64).ravel(), height, width)
+
+    def bands(self, count: int) -> list[GreyImage]:
+        """The image cut into at most `count` bands of about equal height.
+
+        Example:
+            >>> image = GreyImage.from_frame(np.zeros((5, 4), np.uint8))
+            >>> [(band.height, band.first_pixel) for band in image.bands(2)]
+            [(3, 0), (2, 12)]
+        """
+        rows = -(-self.height // count)
+        return [
+            self._rows(top, min(top + rows, self.height)) for top in range(0, self.height, rows)
+        ]
+
+    def _rows(self, top: int, bottom: int) -> GreyImage:
+        part = slice(top * self.width, bottom * self.width)
+        codes, levels = self.codes[part], self.levels
+        if codes.dtype != np.uint8:  # a floating image is its own table
+            codes, levels = self.codes[: codes.size], levels[part]
+        return GreyImage(codes, levels, bottom - top, self.width, self.first_pixel + part.start)

@@ -18,7 +18,7 @@ from eqs.frames import GreyImage
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.passage import chance_of_on, passage_time
-from eqs.simulators.randomness import draw_key, uniform, uniform_map, word_at
+from eqs.simulators.randomness import draw_key, mixed, uniform, uniform_map, word_at
 from eqs.simulators.stream import Interval
 
 
@@ -61,6 +61,8 @@ class DVSVoltmeter(Simulator):
     """
 
     name: ClassVar[str] = "dvs_voltmeter"
+    version: ClassVar[int] = 2
+    in_bands: ClassVar[bool] = True
 
     contrast_gain: float = 5.265
     dark_level: float = 20.0
@@ -110,7 +112,8 @@ class DVSVoltmeterPixels:
         self.voltage = np.zeros(pixels)
         if model.mode == "fixed" and model.leaks:
             # Drifting from 0 to 1 again and again, a pixel is as likely at one place as another.
-            self.voltage = uniform_map(draw_key(model.seed, "leak phase", sequence), pixels)
+            key = draw_key(model.seed, "leak phase", sequence, first_pixel=image.first_pixel)
+            self.voltage = uniform_map(key, pixels)
         self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
@@ -123,7 +126,13 @@ class DVSVoltmeterPixels:
             (model.contrast_gain, model.dark_level, model.leak_per_us, model.light_leak_per_us),
             (model.photon_noise_per_sqrt_us, model.thermal_noise_per_sqrt_us),
             model.mode == "faithful",
-            draw_key(model.seed, "motion", self.sequence, str(interval.frame)),
+            draw_key(
+                model.seed,
+                "motion",
+                self.sequence,
+                str(interval.frame),
+                first_pixel=image.first_pixel,
+            ),
             interval.start_us,
             interval.span_us,
             self.keys,
@@ -146,18 +155,20 @@ def _fire(
     keys: NDArray[np.int64],
 ) -> Fired:
     gain, dark, leak, light_leak = drifts
+    gain_per_us = gain / span_us
     rounding = 0.5 if faithful else 0.0
     count = 0
     for pixel in range(voltage.size):
         first, last = start[1][start[0][pixel]], end[1][end[0][pixel]]
         light = 0.5 * (first + last)
-        drift = gain * (last - first) / (span_us * (light + dark)) + leak + light_leak * light
-        spread = spreads[0] * math.sqrt(light) / (light + dark) + spreads[1]
-        level, elapsed_us, ordinal = voltage[pixel], 0.0, 0
-        pixel_key = word_at(frame_key, pixel)
+        relative = 1.0 / (light + dark)
+        drift = gain_per_us * (last - first) * relative + leak + light_leak * light
+        spread = spreads[0] * math.sqrt(light) * relative + spreads[1]
+        level, elapsed_us = voltage[pixel], 0.0
+        word = word_at(frame_key, pixel)
         while True:
-            word = word_at(pixel_key, ordinal)
-            up = uniform(word_at(word, 0)) < chance_of_on(level, drift, spread, faithful)
+            chance = chance_of_on(level, drift, spread, faithful)
+            up = chance == 1.0 or uniform(word_at(word, 0)) < chance
             distance = 1.0 - level if up else 1.0 + level
             towards = drift if up else -drift
             wait_us = passage_time(distance, towards, spread, word, faithful)
@@ -169,6 +180,6 @@ def _fire(
             keys = with_room(keys, count + 1)
             keys[count] = event_key(start_us + int(elapsed_us + rounding), pixel, 1 if up else 0)
             level = 0.0
-            ordinal += 1
+            word = mixed(word)
             count += 1
     return keys, count

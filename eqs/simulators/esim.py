@@ -103,8 +103,8 @@ class ESIMPixels:
         self.reference = self.signal[image.codes]
         self.last_us = np.full(pixels if model.refractory_us > 0 else 1, -np.inf)
         sigma, seed = model.threshold_sigma_log, model.seed
-        self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", pixels)
-        self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", pixels)
+        self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image)
+        self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image)
         self.difference = np.empty(pixels)
         self.chosen = np.empty(pixels + 1, np.int32)
         self.passed = np.empty(pixels + 1, np.int64)

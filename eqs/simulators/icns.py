@@ -64,6 +64,8 @@ class ICNS(Simulator):
     """
 
     name: ClassVar[str] = "icns"
+    version: ClassVar[int] = 2
+    in_bands: ClassVar[bool] = True
 
     threshold_on_log: float = 0.4
     threshold_off_log: float = 0.4

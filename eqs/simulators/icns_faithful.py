@@ -33,16 +33,16 @@ class FaithfulICNSPixels:
         self.voltage = model.signal(image.levels)[image.codes]
         self.reset = self.voltage.copy()
         self.tau_us = self._time_constants(self.voltage)
-        self.on = self._thresholds(model.threshold_on_log, "threshold on")
-        self.off = self._thresholds(model.threshold_off_log, "threshold off")
+        self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
+        self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
         self.blind_us = np.full(self.voltage.size, SEEING)
         self.on_us, self.on_period_us = self._background(model.background_on_hz, "on")
         self.off_us, self.off_period_us = self._background(model.background_off_hz, "off")
         self.keys = np.empty(self.voltage.size, np.int64)
 
-    def _thresholds(self, mean_log: float, name: str) -> NDArray[np.float64]:
+    def _thresholds(self, mean_log: float, name: str, image: GreyImage) -> NDArray[np.float64]:
         sigma, seed = self.model.threshold_sigma_log, self.model.seed
-        return threshold_map(mean_log, sigma, seed, name, self.voltage.size).copy()
+        return threshold_map(mean_log, sigma, seed, name, image).copy()
 
     def _time_constants(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.model.time_constant_us * 1000.0 * np.exp(-signal)

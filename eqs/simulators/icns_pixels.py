@@ -33,14 +33,14 @@ class ICNSPixels:
         self.signal = model.signal(image.levels)
         self.voltage = self.signal[image.codes]
         self.reset = self.voltage.copy()
-        self.on = self._thresholds(model.threshold_on_log, "threshold on")
-        self.off = self._thresholds(model.threshold_off_log, "threshold off")
+        self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
+        self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
         self.blind_us = np.full(self.voltage.size, SEEING)
         self.keys = np.empty(self.voltage.size, np.int64)
 
-    def _thresholds(self, mean_log: float, name: str) -> NDArray[np.float64]:
+    def _thresholds(self, mean_log: float, name: str, image: GreyImage) -> NDArray[np.float64]:
         sigma, seed = self.model.threshold_sigma_log, self.model.seed
-        return threshold_map(mean_log, sigma, seed, name, self.voltage.size).copy()
+        return threshold_map(mean_log, sigma, seed, name, image).copy()
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
@@ -48,15 +48,21 @@ class ICNSPixels:
         signal = model.signal(image.levels)
         background = (model.background_on_hz, model.background_off_hz)
         self.keys, count = _fire(
-            (self.codes, self.signal),
-            (image.codes, signal),
+            (self.codes, self.signal, np.exp(-0.5 * self.signal)),
+            (image.codes, signal, np.exp(-0.5 * signal)),
             (self.voltage, self.reset, self.blind_us),
             (self.on, self.off),
             (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
             (float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
             float(model.time_constant_us),
             (background[0] * MICROSECONDS, background[1] * MICROSECONDS),
-            draw_key(model.seed, "events", self.sequence, str(interval.frame)),
+            draw_key(
+                model.seed,
+                "events",
+                self.sequence,
+                str(interval.frame),
+                first_pixel=image.first_pixel,
+            ),
             float(interval.start_us),
             float(interval.stop_us),
             self.keys,
@@ -76,8 +82,8 @@ def _background_wait(word: np.uint64, rate_per_us: float, left_us: float) -> flo
 
 @njit(cache=True, nogil=True)
 def _fire(
-    start: tuple[NDArray[Any], NDArray[np.float64]],
-    end: tuple[NDArray[Any], NDArray[np.float64]],
+    start: tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]],
+    end: tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]],
     state: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     thresholds: tuple[NDArray[np.float64], NDArray[np.float64]],
     drawn: tuple[float, float, float],
@@ -94,9 +100,10 @@ def _fire(
     rate = background_per_us[0] + background_per_us[1]
     count = 0
     for pixel in range(voltage.size):
-        first, last = start[1][start[0][pixel]], end[1][end[0][pixel]]
+        codes = start[0][pixel], end[0][pixel]
+        first, last = start[1][codes[0]], end[1][codes[1]]
         slope = (last - first) / (stop_us - start_us)
-        tau_us = time_constant_us * 1000.0 * math.exp(-0.5 * (first + last))
+        tau_us = time_constant_us * 1000.0 * start[2][codes[0]] * end[2][codes[1]]
         level, now_us = voltage[pixel], start_us
         pixel_key, ordinal = word_at(frame_key, pixel), 0
         while True:

@@ -74,6 +74,7 @@ class ImprovedESIM(Simulator):
     """
 
     name: ClassVar[str] = "improved_esim"
+    in_bands: ClassVar[bool] = True
 
     threshold_on_log: float = 0.25
     threshold_off_log: float = 0.25
@@ -146,16 +147,18 @@ class ImprovedESIMPixels:
         """Settle on the first image."""
         self.model = model
         pixels, seed, sigma = image.codes.size, model.seed, model.threshold_sigma_log
-        self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", pixels)
-        self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", pixels)
+        self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image)
+        self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image)
         self.filter = PixelFilter(model, image)
         self.above = np.zeros(pixels)
+        first_pixel = image.first_pixel
         if model.leaks:
-            self.above = self.on * uniform_map(draw_key(seed, "leak phase", sequence), pixels)
+            key = draw_key(seed, "leak phase", sequence, first_pixel=first_pixel)
+            self.above = self.on * uniform_map(key, pixels)
         self.blind_us = np.zeros(pixels)
         if model.refractory_us > 0 and not model.leaks:
-            first = uniform_map(draw_key(seed, "first blindness", sequence), pixels)
-            self.blind_us = model.refractory_us * first
+            key = draw_key(seed, "first blindness", sequence, first_pixel=first_pixel)
+            self.blind_us = model.refractory_us * uniform_map(key, pixels)
         self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:

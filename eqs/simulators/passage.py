@@ -11,9 +11,10 @@ import math
 import numpy as np
 from numba import njit
 
-from eqs.simulators.randomness import normal, uniform, word_at
+from eqs.simulators.randomness import normal, uniform, word_at, ziggurat_normal
 
 _SMALLEST_SQUARE = 1e-300
+_CERTAIN = 40.0  # exponents from which on a chance is nought or one to the last bit
 _MOST_ATTEMPTS = 1000
 
 
@@ -37,6 +38,10 @@ def chance_of_on(level: float, drift: float, spread: float, faithful: bool) -> f
         return 1.0 if drift > 0 else 0.0
     scale = 2.0 * drift / (spread * spread)
     ahead, behind = scale * (1.0 - level), scale * (1.0 + level)
+    if behind > _CERTAIN:
+        return 1.0
+    if ahead < -_CERTAIN:
+        return 0.0
     if drift > 0:
         return np.expm1(-behind) / np.expm1(-(ahead + behind))
     return np.exp(ahead) * np.expm1(behind) / np.expm1(ahead + behind)
@@ -59,16 +64,17 @@ def passage_time(
         return 0.0
     if spread == 0.0:
         return distance / towards if towards > 0 else math.inf
-    shape = (distance / spread) ** 2
     if towards == 0.0:
         square = max(normal(word_at(word, 1)) ** 2, _SMALLEST_SQUARE)
-        return (2.0 if faithful else 1.0) * shape / square
+        return (2.0 if faithful else 1.0) * (distance / spread) ** 2 / square
     mean = distance / abs(towards)
     if towards < 0.0 and faithful:
-        return _misdrawn_passage(mean, shape, word)
-    half = 0.5 * mean / shape * normal(word_at(word, 1)) ** 2
-    root = mean / (1.0 + half + math.sqrt(half * (half + 2.0)))
-    return root if uniform(word_at(word, 2)) * (mean + root) <= mean else mean * mean / root
+        return _misdrawn_passage(mean, (distance / spread) ** 2, word)
+    size = ziggurat_normal(word_at(word, 1))
+    half = 0.5 * (size * spread) ** 2 / (distance * abs(towards))
+    stretch = 1.0 + half + math.sqrt(half * (half + 2.0))
+    shorter = 1.0 / stretch  # computed in either case, so that the even choice costs no branch
+    return mean * (shorter if uniform(word_at(word, 2)) * (1.0 + shorter) <= 1.0 else stretch)
 
 
 @njit(cache=True)

@@ -32,14 +32,14 @@ class PropheseePixels:
         self.sequence = sequence
         self.first_filter = model.signal(image.levels)[image.codes]
         self.second_filter = self.first_filter.copy()
-        self.on: NDArray[Any] = self._thresholds(model.threshold_on_log, "threshold on")
-        self.off: NDArray[Any] = self._thresholds(model.threshold_off_log, "threshold off")
+        self.on: NDArray[Any] = self._thresholds(model.threshold_on_log, "threshold on", image)
+        self.off: NDArray[Any] = self._thresholds(model.threshold_off_log, "threshold off", image)
         self.keys = np.empty(image.codes.size, np.int64)
         self._begin()
 
-    def _thresholds(self, mean_log: float, name: str) -> NDArray[np.float64]:
-        model, pixels = self.model, self.first_filter.size
-        drawn = threshold_map(mean_log, model.threshold_sigma_log, model.seed, name, pixels)
+    def _thresholds(self, mean_log: float, name: str, image: GreyImage) -> NDArray[np.float64]:
+        model = self.model
+        drawn = threshold_map(mean_log, model.threshold_sigma_log, model.seed, name, image)
         return np.minimum(drawn, LARGEST_THRESHOLD_LOG) if model.threshold_sigma_log else drawn
 
     def _begin(self) -> None:

@@ -22,6 +22,8 @@ _LOW = np.uint64(0xFFFFFFFF)
 _S30, _S27, _S31, _S32, _S11 = (np.uint64(shift) for shift in (30, 27, 31, 32, 11))
 _QUANTILE_MASK = np.uint64(2047)
 _LARGEST_POISSON = 10_000
+_LAYER_MASK = np.uint64(127)
+_LAST_LAYER, _LAYER_AREA = 3.442619855899, 9.91256303526217e-3  # of 128 layers
 
 
 def _normal_quantiles(count: int) -> NDArray[np.float64]:
@@ -34,8 +36,26 @@ def _normal_quantiles(count: int) -> NDArray[np.float64]:
 NORMAL_QUANTILES = _normal_quantiles(2048)
 
 
-def draw_key(seed: int, *names: str) -> np.uint64:
+def _layers(count: int) -> NDArray[np.float64]:
+    """Right ends of layers of equal area under exp(-x**2 / 2), the lowest with the tail."""
+    density = math.exp(-0.5 * _LAST_LAYER**2)
+    ends = [_LAYER_AREA / density, _LAST_LAYER]
+    while len(ends) < count:
+        density += _LAYER_AREA / ends[-1]
+        ends.append(math.sqrt(-2.0 * math.log(density)))
+    return np.array([*ends, 0.0])
+
+
+ZIGGURAT = _layers(128)
+
+
+def draw_key(seed: int, *names: str, first_pixel: int = 0) -> np.uint64:
     """The key of one family of draws, from the seed and what the draws are for.
+
+    Args:
+        seed: of the simulator.
+        names: what the draws are for.
+        first_pixel: which pixel of the sensor draws number 0, in a part of the sensor.
 
     Example:
         >>> len({draw_key(0, "leak"), draw_key(1, "leak"), draw_key(0, "shot")})
@@ -43,7 +63,8 @@ def draw_key(seed: int, *names: str) -> np.uint64:
     """
     text = "\0".join((str(int(seed)), *names))
     digest = hashlib.blake2b(text.encode(), digest_size=8).digest()
-    return np.frombuffer(digest, "<u8")[0]
+    key = int.from_bytes(digest, "little") + first_pixel * int(_GOLDEN)
+    return np.uint64(key % 2**64)
 
 
 @njit(cache=True)
@@ -72,6 +93,41 @@ def normal(word: np.uint64) -> float:
     radius = (np.float64(word >> _S32) + 0.5) * 2.0**-32
     angle = np.float64(word & _LOW) * 2.0**-32
     return math.sqrt(-2.0 * math.log(radius)) * math.cos(2.0 * math.pi * angle)
+
+
+@njit(cache=True)
+def ziggurat_normal(word: np.uint64) -> float:
+    """A standard normal number from 64 random bits, several times faster than `normal`.
+
+    Layers of equal area under the density (Marsaglia and Tsang, "The Ziggurat Method", 2000):
+    nearly always a product and a comparison; else more bits follow from the same word.
+    """
+    while True:
+        layer = np.int64(word & _LAYER_MASK)
+        side = 2.0 * uniform(word) - 1.0
+        size = abs(side) * ZIGGURAT[layer]
+        if size < ZIGGURAT[layer + 1]:
+            break
+        word = word_at(word, 0)
+        if layer == 0:
+            size = _tail(word)
+            break
+        low, high = ZIGGURAT[layer], ZIGGURAT[layer + 1]
+        share = uniform(word_at(word, 1))
+        heights = math.exp(-0.5 * low * low), math.exp(-0.5 * high * high)
+        if heights[0] + share * (heights[1] - heights[0]) < math.exp(-0.5 * size * size):
+            break
+    return math.copysign(size, side)
+
+
+@njit(cache=True)
+def _tail(word: np.uint64) -> float:
+    """The size of a normal number beyond the last layer."""
+    while True:
+        beyond = -math.log(1.0 - uniform(word_at(word, 1))) / _LAST_LAYER
+        if -2.0 * math.log(1.0 - uniform(word_at(word, 2))) > beyond * beyond:
+            return _LAST_LAYER + beyond
+        word = word_at(word, 0)
 
 
 @njit(cache=True)

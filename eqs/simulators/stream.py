@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from eqs.events import Events
 from eqs.frames import GreyImage, checked_frames, checked_times
+from eqs.simulators.bands import BandedPixels, useful_bands
 from eqs.simulators.ordering import MAX_PIXELS, MAX_TIME_US, ReorderBuffer, events_of, ordered
 from eqs.simulators.readout import WaitingEvents
 
@@ -153,13 +155,19 @@ class Stream:
         index, self._frames_seen = self._frames_seen, self._frames_seen + 1
         if self._pixels is None:
             self._origin_us = self._last_us = time_us
-            self._pixels = self.simulator.begin(image, self.sequence)
+            self._pixels = self._first_pixels(image)
             if self.simulator.readout is not None:
                 self._waiting = WaitingEvents(self.simulator.readout, self._size)
             return np.empty(0, np.int64), Interval(0, 0, 0)
         interval = Interval(index, self._last_us - self._origin_us, time_us - self._origin_us)
         self._last_us = time_us
         return self._pixels.advance(image, interval).copy(), interval
+
+    def _first_pixels(self, image: GreyImage) -> Pixels:
+        begin = partial(self.simulator.begin, sequence=self.sequence)
+        side_by_side = self.simulator.in_bands and self.simulator.mode == "fixed"
+        bands = useful_bands(image.codes.size) if side_by_side else 1
+        return begin(image) if bands == 1 else BandedPixels(begin, image, bands)
 
     def _released(self, keys: NDArray[np.int64], interval: Interval) -> Events:
         """The events that the end of an interval makes final."""

@@ -37,8 +37,8 @@ class V2EPixels:
         self.model = model
         self.sequence = sequence
         pixels, seed, sigma = image.codes.size, model.seed, model.threshold_sigma_log
-        on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", pixels)
-        off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", pixels)
+        on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image)
+        off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image)
         self.on, self.off = self._stored(on), self._stored(off)
         self.leak_per_second = self._stored(self._leaks(on))
         signal = lin_log(image.levels, model.knee_level)

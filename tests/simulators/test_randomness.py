@@ -9,12 +9,14 @@ from scipy import stats
 
 from eqs.simulators.randomness import (
     NORMAL_QUANTILES,
+    ZIGGURAT,
     draw_key,
     normal_map,
     normal_quantile,
     poisson,
     uniform_map,
     word_at,
+    ziggurat_normal,
 )
 
 COUNT = 40_000
@@ -36,6 +38,14 @@ def quantile_draws(key, count, quantiles):
     return draws
 
 
+@njit
+def ziggurat_draws(key, count):
+    draws = np.empty(count)
+    for index in range(count):
+        draws[index] = ziggurat_normal(word_at(key, index))
+    return draws
+
+
 def test_words_are_those_of_splitmix64():
     # First outputs of the reference generator from the seed 1234567.
     words = [int(word_at(np.uint64(1234567), index)) for index in range(3)]
@@ -51,6 +61,19 @@ def test_uniform_numbers_are_uniform():
 
 def test_normal_numbers_are_normal():
     assert stats.kstest(normal_map(draw_key(0, "a"), COUNT), "norm").pvalue > 1e-3
+
+
+def test_ziggurat_numbers_are_normal_far_into_the_tails():
+    values = ziggurat_draws(draw_key(0, "a"), 2_000_000)
+    assert stats.kstest(values, "norm").pvalue > 1e-3
+    last_layer = ZIGGURAT[1]
+    for bound in (1.0, 2.0, last_layer, 4.0):
+        for tail in (values > bound, values < -bound):
+            expected = len(values) * stats.norm.sf(bound)
+            assert abs(tail.sum() - expected) < 4 * math.sqrt(expected)
+    sizes = np.abs(values[np.abs(values) > last_layer])
+    law = stats.truncnorm(last_layer, np.inf)
+    assert stats.kstest(sizes, law.cdf).pvalue > 1e-3
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from eqs.simulators import (
     Recorded,
     Vid2E,
 )
+from eqs.simulators.bands import useful_bands
 
 SIMULATORS = [
     ESIM(),
@@ -104,6 +105,22 @@ def test_chunks_of_any_size_give_the_same_events(simulator, walk):
     for _ in range(3):
         cuts = np.sort(generator.integers(0, len(frames) + 1, 4))
         assert_same(whole, chunked(simulator, frames, times, cuts.tolist()))
+
+
+@pytest.mark.parametrize("simulator", [s for s in SIMULATORS if s.in_bands], ids=label)
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_bands_of_any_height_give_the_same_events(simulator, dtype, walk, monkeypatch):
+    frames, times = walk[0].astype(dtype), walk[1]
+    whole = simulator.simulate(frames, times)
+    for bands in (2, 3, 5):
+        monkeypatch.setattr("eqs.simulators.stream.useful_bands", lambda _, bands=bands: bands)
+        assert_same(whole, simulator.simulate(frames, times))
+        assert_same(whole, chunked(simulator, frames, times, [4, 5]))
+
+
+def test_small_sensors_are_left_whole_and_large_ones_use_the_cores(monkeypatch):
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(6), raising=False)
+    assert [useful_bands(h * w) for h, w in ((96, 128), (260, 346), (480, 640))] == [1, 2, 6]
 
 
 @pytest.mark.parametrize("simulator", SIMULATORS, ids=label)
