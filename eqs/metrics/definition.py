@@ -14,6 +14,7 @@ from torch import nn
 TAPS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 
 KINDS = {
+    "features": ("raw", "centred"),
     "patch": ("cells", "grid"),
     "state": ("carried", "reset"),
     "mask": ("none", "active"),
@@ -44,7 +45,7 @@ class Definition:
 
     Args:
         tap: which activation of each stage is compared.
-        centred: whether the mean real feature is subtracted before the cosine.
+        features: compared as they are, `raw`, or `centred`, minus the mean real feature.
         stages: stages of the backbone, counted from 1.
         patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
         patch_size: side of a patch in cells, or patches per side of the map.
@@ -66,7 +67,7 @@ class Definition:
     """
 
     tap: str = "hidden"
-    centred: bool = False
+    features: Literal["raw", "centred"] = "raw"
     stages: tuple[int, ...] = (1, 2, 3)
     patch: Literal["cells", "grid"] = "cells"
     patch_size: int = 3
@@ -114,7 +115,7 @@ class Definition:
     @property
     def column(self) -> str:
         """Name of the reading in a table, for instance `hidden_centred` or `gate_raw`."""
-        return f"{self.tap}_{'centred' if self.centred else 'raw'}"
+        return f"{self.tap}_{self.features}"
 
     def warmup_of(self, windows: int) -> int:
         """Windows dropped at the start of a stream of `windows` windows."""

@@ -42,7 +42,8 @@ class EventQualityScore(Metric):
         tap: which activation is compared: gate (the paper's formula), gate_logits, hidden, cell,
             attention or downsample.
         centre: mean real feature: a file, a `Centre`, or one tensor per stage.
-        centred: whether a centre must be given; None takes whatever `centre` says.
+        features: compared `raw`, or `centred`, minus the mean real feature; None takes
+            `centred` with a centre and `raw` without.
         stages: stages of the backbone, counted from 1.
         patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
         patch_size: side of a patch in cells, or patches per side of the map.
@@ -81,7 +82,7 @@ class EventQualityScore(Metric):
         *,
         tap: str = "hidden",
         centre: Centre | Path | str | Sequence[Tensor] | None = None,
-        centred: bool | None = None,
+        features: Literal["raw", "centred"] | None = None,
         stages: Sequence[int] = (1, 2, 3),
         patch: Literal["cells", "grid"] = "cells",
         patch_size: int = 3,
@@ -109,7 +110,7 @@ class EventQualityScore(Metric):
             )
         definition = Definition(
             tap=tap,
-            centred=centre is not None if centred is None else centred,
+            features=features or ("raw" if centre is None else "centred"),
             stages=tuple(stages),
             patch=patch,
             patch_size=patch_size,

@@ -59,7 +59,7 @@ class Reading:
 
     Args:
         definition: every choice of the score.
-        centre: mean real feature; needed where the definition is centred.
+        centre: mean real feature; needed where the features are not raw.
 
     Raises:
         ValueError: the centre is missing, not asked for, or of another tap.
@@ -70,11 +70,11 @@ class Reading:
 
     def __post_init__(self) -> None:
         """Check that definition and centre belong together."""
-        if self.definition.centred != (self.centre is not None):
+        if (self.definition.features == "raw") != (self.centre is None):
             wanted, got = ("a", "none") if self.centre is None else ("no", "one")
             raise ValueError(
-                f"Expected {wanted} centre for a definition with centred={self.definition.centred},"
-                f" got {got}; set eqs.centre or eqs.centred"
+                f"Expected {wanted} centre for {self.definition.features} features, got {got}; "
+                "set eqs.centre or eqs.features"
             )
         if self.centre is not None and self.centre.tap != self.definition.tap:
             raise ValueError(
@@ -107,7 +107,7 @@ def score_group(
         chunks: histograms, shape (windows, 1 + candidates, 2 * bins, height, width) each; the
             reference comes first.
         n_windows: windows in all chunks together.
-        readings: readings that differ only in tap and centring.
+        readings: readings that differ only in tap and features.
         watch: sees the same features.
         device: where the backbone lives.
 
@@ -160,7 +160,7 @@ def score_streams(
         backbone: the judge's network.
         reference: real stream, or its histograms of shape (windows, 2 * bins, height, width).
         candidates: streams of the same kind, sensor and clock.
-        readings: readings that differ only in tap and centring.
+        readings: readings that differ only in tap and features.
         start_us: start of the first window; by default where all streams have begun.
         stop_us: time that no window may pass; by default where the first stream ends.
         chunk_windows: windows per pass; chosen from the sensor size if None.
@@ -186,12 +186,12 @@ def score_streams(
 def _shared_pass(readings: Sequence[Reading]) -> Definition:
     """The choices that all readings share, or an error where they do not."""
     shared = {
-        replace(reading.definition, tap=readings[0].definition.tap, centred=False)
+        replace(reading.definition, tap=readings[0].definition.tap, features="raw")
         for reading in readings
     }
     if len(shared) != 1 or len({reading.name for reading in readings}) < len(readings):
         raise ValueError(
-            "Expected readings that differ in tap or centring and share all other choices, got "
+            "Expected readings that differ in tap or features and share all other choices, got "
             f"{[reading.name for reading in readings]} with {len(shared)} sets of other choices"
         )
     return readings[0].definition

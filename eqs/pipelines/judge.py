@@ -167,20 +167,21 @@ def _readings(
 ) -> tuple[Reading, ...]:
     readings = [Reading(definition=replace(definition, tap=tap)) for tap in taps]
     readings += [
-        Reading(definition=replace(definition, tap=tap, centred=True), centre=centre)
+        Reading(definition=replace(definition, tap=tap, features="centred"), centre=centre)
         for tap, centre in centres.items()
     ]
 
     def distance_to_headline(reading: Reading) -> tuple[bool, bool]:
         chosen = reading.definition
-        return chosen.tap != cfg.eqs.tap, chosen.centred != cfg.eqs.centred
+        return chosen.tap != cfg.eqs.tap, chosen.features != cfg.eqs.features
 
     return tuple(sorted(readings, key=distance_to_headline))
 
 
 def _centre_path(folder: Path, tap: str, definition: Definition) -> Path:
     """One file per tap and binning: the centre depends on both."""
-    return folder / f"centre-{replace(definition, tap=tap, centred=True).hash}.npz"
+    centred = replace(definition, tap=tap, features="centred")
+    return folder / f"centre-{centred.hash}.npz"
 
 
 def _stored_centres(

@@ -10,7 +10,7 @@ from eqs.metrics.definition import FIXED_RULES
 
 OTHER = {
     "tap": "gate",
-    "centred": True,
+    "features": "centred",
     "stages": (1, 2),
     "patch": "grid",
     "patch_size": 2,

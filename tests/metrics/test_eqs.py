@@ -25,7 +25,7 @@ TAPS = ("gate", "hidden", "downsample")
 def readings(*taps, centres=None):
     raw = [Reading(definition=replace(BASE, tap=tap)) for tap in taps]
     return raw + [
-        Reading(definition=replace(BASE, tap=tap, centred=True), centre=centre)
+        Reading(definition=replace(BASE, tap=tap, features="centred"), centre=centre)
         for tap, centre in (centres or {}).items()
     ]
 
@@ -280,8 +280,8 @@ def test_refusals_of_the_metric(backbone, make_events, tmp_path):
         EventQualityScore()
     with pytest.raises(ValueError, match=r"weights or a backbone, got both"):
         EventQualityScore("random", backbone=backbone)
-    with pytest.raises(ValueError, match="Expected a centre for a definition with centred=True"):
-        EventQualityScore(backbone=backbone, centred=True)
+    with pytest.raises(ValueError, match="Expected a centre for centred features, got none"):
+        EventQualityScore(backbone=backbone, features="centred")
     with pytest.raises(FileNotFoundError, match=r"gone.npz, got no file; set eqs.centre"):
         EventQualityScore(backbone=backbone, centre=tmp_path / "gone.npz")
     with pytest.raises(ValueError, match=r"each of the stages \(1, 2, 3\), got 1"):
@@ -309,13 +309,13 @@ def test_broken_weights_are_never_a_silent_nan(backbone, make_events):
 
 def test_readings_must_share_a_pass(backbone, make_events):
     ways = [*readings("gate"), Reading(definition=replace(BASE, patch_size=2))]
-    with pytest.raises(ValueError, match="differ in tap or centring"):
+    with pytest.raises(ValueError, match="differ in tap or features"):
         score_streams(backbone, make_events(1), [make_events(2)], ways)
 
 
 def test_centre_belongs_to_its_tap(centres):
     with pytest.raises(ValueError, match="centre of tap gate, got one of hidden"):
-        Reading(definition=replace(BASE, tap="gate", centred=True), centre=centres["hidden"])
+        Reading(definition=replace(BASE, tap="gate", features="centred"), centre=centres["hidden"])
 
 
 def test_centre_is_the_mean_pooled_feature_after_warmup(backbone):

@@ -48,7 +48,7 @@ def readings(judge):
     centres = feature_centres(judge, [moving_edges(8), moving_edges(9)], taps=TAPS, definition=BASE)
     raw = [Reading(definition=replace(BASE, tap=tap)) for tap in TAPS]
     return raw + [
-        Reading(definition=replace(BASE, tap=tap, centred=True), centre=centre)
+        Reading(definition=replace(BASE, tap=tap, features="centred"), centre=centre)
         for tap, centre in centres.items()
     ]
 

@@ -27,5 +27,5 @@ def test_headline_reading(tmp_path):
     Centre(tap="hidden", stages=(1, 2, 3), means=means).save(tmp_path / "centre.npz")
     metric = build("eqs", f"metric.centre={tmp_path / 'centre.npz'}", "metric.stages=[1,2]")
     assert metric.definition == Definition(
-        centred=True, stages=(1, 2), architecture="rvt-tiny-split2"
+        features="centred", stages=(1, 2), architecture="rvt-tiny-split2"
     )
