@@ -13,6 +13,7 @@ from eqs.metrics.similarity import (
     patch_cosine,
     pool_grid,
     pool_patches,
+    whitening_matrix,
 )
 from eqs.metrics.windows import group_chunks, histogram_chunks, window_starts
 
@@ -42,5 +43,6 @@ __all__ = [
     "score_streams",
     "singles",
     "weights_sha256",
+    "whitening_matrix",
     "window_starts",
 ]

@@ -14,7 +14,7 @@ from torch import nn
 TAPS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 
 KINDS = {
-    "features": ("raw", "centred"),
+    "features": ("raw", "centred", "whitened"),
     "patch": ("cells", "grid"),
     "state": ("carried", "reset"),
     "mask": ("none", "active"),
@@ -29,6 +29,7 @@ FIXED_RULES = {
     "pooling": "mean of real cells, patches do not overlap, padded right and bottom",
     "start": "state zero, one per stream",
     "warmup": "first min(warmup_windows, n // 4) windows",
+    "whitened": "covariance of real features, shrunk by 0.1 towards its mean variance",
     "zero": "both zero 1, one zero 0, eps 1e-8",
 }
 
@@ -45,7 +46,8 @@ class Definition:
 
     Args:
         tap: which activation of each stage is compared.
-        features: compared as they are, `raw`, or `centred`, minus the mean real feature.
+        features: compared as they are, `raw`; `centred`, minus the mean real feature; or also
+            `whitened`, so that real features vary alike in every direction.
         stages: stages of the backbone, counted from 1.
         patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
         patch_size: side of a patch in cells, or patches per side of the map.
@@ -67,7 +69,7 @@ class Definition:
     """
 
     tap: str = "hidden"
-    features: Literal["raw", "centred"] = "raw"
+    features: Literal["raw", "centred", "whitened"] = "raw"
     stages: tuple[int, ...] = (1, 2, 3)
     patch: Literal["cells", "grid"] = "cells"
     patch_size: int = 3

@@ -28,8 +28,9 @@ class EventQualityScore(Metric):
         \cos(f_{ksp}^{sim} - m_s,\; f_{ksp}^{real} - m_s)
 
     over windows :math:`k` after the warm-up, stages :math:`s` and patches :math:`p`, with the mean
-    real feature :math:`m_s` where the score is centred and zero where it is not. `compute` returns
-    the unweighted mean over updates, one update being one sequence.
+    real feature :math:`m_s` where the score is centred and zero where it is not; whitened vectors
+    are also multiplied by a matrix :math:`W_s` (`whitening_matrix`). `compute` returns the
+    unweighted mean over updates, one update being one sequence.
 
     Convention: EQS is a similarity in [-1, 1], higher is better, 1 for identical streams; the
     distance is `1 - EQS`. The published text defines the distance and tabulates the similarity.
@@ -41,9 +42,10 @@ class EventQualityScore(Metric):
         weights: checkpoint of a detector trained on real events, or "random" as a control.
         tap: which activation is compared: gate (the paper's formula), gate_logits, hidden, cell,
             attention or downsample.
-        centre: mean real feature: a file, a `Centre`, or one tensor per stage.
-        features: compared `raw`, or `centred`, minus the mean real feature; None takes
-            `centred` with a centre and `raw` without.
+        centre: mean real feature: a file, a `Centre`, or one tensor per stage; for `whitened`
+            features with its covariance, so no tensors.
+        features: compared `raw`, `centred`, minus the mean real feature, or also `whitened` by
+            its covariance; None takes `centred` with a centre and `raw` without.
         stages: stages of the backbone, counted from 1.
         patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
         patch_size: side of a patch in cells, or patches per side of the map.
@@ -82,7 +84,7 @@ class EventQualityScore(Metric):
         *,
         tap: str = "hidden",
         centre: Centre | Path | str | Sequence[Tensor] | None = None,
-        features: Literal["raw", "centred"] | None = None,
+        features: Literal["raw", "centred", "whitened"] | None = None,
         stages: Sequence[int] = (1, 2, 3),
         patch: Literal["cells", "grid"] = "cells",
         patch_size: int = 3,

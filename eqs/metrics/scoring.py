@@ -62,7 +62,8 @@ class Reading:
         centre: mean real feature; needed where the features are not raw.
 
     Raises:
-        ValueError: the centre is missing, not asked for, or of another tap.
+        ValueError: the centre is missing, not asked for, of another tap, or without the covariances
+            that whiten.
     """
 
     definition: Definition
@@ -80,6 +81,12 @@ class Reading:
             raise ValueError(
                 f"Expected a centre of tap {self.definition.tap}, got one of {self.centre.tap}; "
                 "set eqs.centre or eqs.tap"
+            )
+        whitened = self.definition.features == "whitened"
+        if whitened and self.centre is not None and not self.centre.covariances:
+            raise ValueError(
+                "Expected a centre with covariances for whitened features, got means alone; "
+                "compute the centre again or set eqs.features=centred"
             )
 
     @property
@@ -203,8 +210,12 @@ class _Tally:
     def __init__(self, reading: Reading, warmup: int, strides: Sequence[int]) -> None:
         self.definition = reading.definition
         self.warmup, self.strides = warmup, strides
-        means = reading.centre.for_stages(self.definition.stages) if reading.centre else None
-        self.centres: Sequence[Tensor | None] = means or [None] * len(strides)
+        self.nothing: list[Tensor | None] = [None] * len(strides)
+        self.centres = self.whitenings = self.nothing
+        if reading.centre is not None:
+            self.centres = [*reading.centre.for_stages(self.definition.stages)]
+            if self.definition.features == "whitened":
+                self.whitenings = [*reading.centre.whitening(self.definition.stages)]
         self.curves: list[Tensor] = []
         self.sums: list[Tensor] = []
         """By stage, for every patch, the summed cosines and the number of windows that count."""
@@ -215,11 +226,10 @@ class _Tally:
         The chunk's first `skip` windows are warm-up and only show in the curve.
         """
         curves, sums = [], []
-        nowhere: list[Tensor | None] = [None] * len(self.centres)
-        masks = pooled.get(ACTIVE, nowhere)
-        stages = zip(pooled[self.definition.tap], masks, self.centres, strict=True)
-        for stage, active, centre in stages:
-            cosine = patch_cosine(stage[:, 1:], stage[:, :1], centre).double()
+        maps, masks = pooled[self.definition.tap], pooled.get(ACTIVE, self.nothing)
+        stages = zip(maps, masks, self.centres, self.whitenings, strict=True)
+        for stage, active, centre, whitening in stages:
+            cosine = patch_cosine(stage[:, 1:], stage[:, :1], centre, whitening).double()
             if not torch.isfinite(cosine).all():
                 raise ValueError(
                     "Expected finite features, got NaN or infinity; set eqs.weights to a sound "

@@ -54,10 +54,16 @@ def pool_grid(maps: Tensor, side: int = 3) -> Tensor:
     return F.adaptive_avg_pool2d(flat, side).reshape(*maps.shape[:-2], side, side)
 
 
-def patch_cosine(a: Tensor, b: Tensor, centre: Tensor | None = None, eps: float = 1e-8) -> Tensor:
+def patch_cosine(
+    a: Tensor,
+    b: Tensor,
+    centre: Tensor | None = None,
+    whitening: Tensor | None = None,
+    eps: float = 1e-8,
+) -> Tensor:
     r"""Cosine between the feature vectors of two streams, patch by patch.
 
-    .. math:: \cos(a, b) = \frac{(a - m) \cdot (b - m)}{\|a - m\| \, \|b - m\|}
+    .. math:: \cos(a, b) = \frac{W (a - m) \cdot W (b - m)}{\|W (a - m)\| \, \|W (b - m)\|}
 
     Convention: a vector no longer than `eps` counts as zero. Two zero vectors are equal and score
     1; a zero vector beside any other scores 0. `eps` is a threshold, never added to a norm, so
@@ -67,6 +73,7 @@ def patch_cosine(a: Tensor, b: Tensor, centre: Tensor | None = None, eps: float 
         a: pooled features of one stream, shape (..., channels, rows, columns).
         b: pooled features of the other stream, same shape or one that broadcasts to it.
         centre: mean feature vector `m`, shape (channels,), subtracted from both.
+        whitening: matrix `W`, shape (channels, channels), applied to both; none leaves them.
         eps: length up to which a vector counts as zero.
 
     Returns:
@@ -89,6 +96,9 @@ def patch_cosine(a: Tensor, b: Tensor, centre: Tensor | None = None, eps: float 
             )
         column = centre.to(a)[:, None, None]
         a, b = a - column, b - column
+    if whitening is not None:
+        matrix = whitening.to(a)
+        a, b = (torch.einsum("dc,...cij->...dij", matrix, each) for each in (a, b))
     length_a = torch.linalg.vector_norm(a, dim=-3)
     length_b = torch.linalg.vector_norm(b, dim=-3)
     unit_a = a / length_a.clamp_min(eps).unsqueeze(-3)
@@ -96,6 +106,47 @@ def patch_cosine(a: Tensor, b: Tensor, centre: Tensor | None = None, eps: float 
     zero_a, zero_b = length_a <= eps, length_b <= eps
     cosine = (unit_a * unit_b).sum(dim=-3).clamp(-1.0, 1.0)
     return torch.where(zero_a | zero_b, (zero_a & zero_b).to(cosine.dtype), cosine)
+
+
+def whitening_matrix(covariance: Tensor, shrinkage: float = 0.1) -> Tensor:
+    r"""Matrix after which features of this covariance vary about alike in every direction.
+
+    .. math:: W = L^{-1}, \qquad
+        L L^T = (1 - \lambda) \, \Sigma + \lambda \, \frac{\operatorname{tr} \Sigma}{C} \, I
+
+    Convention: a cosine is blind to rotations, so the triangular `W` of a Cholesky factor, that of
+    the principal axes and the symmetric one (ZCA) give one score; the triangle is the plainest.
+    Without the shrinkage :math:`\lambda` a direction in which real features hardly vary, as a
+    covariance of few of them has many, would count as much as any other; with it no direction is
+    stretched more than :math:`\sqrt{1 / \lambda}` times a direction of mean variance.
+
+    Source: Kessy, Lewin and Strimmer, "Optimal whitening and decorrelation", 2018; the shrinkage
+    is that of Ledoit and Wolf, 2004, with a fixed intensity.
+
+    Args:
+        covariance: covariance of the features, shape (channels, channels).
+        shrinkage: share of the mean variance, in (0, 1].
+
+    Returns:
+        Shape (channels, channels), float64.
+
+    Raises:
+        ValueError: the features do not vary.
+
+    Example:
+        >>> whitening_matrix(torch.tensor([[4.0]]))
+        tensor([[0.5000]], dtype=torch.float64)
+    """
+    exact = covariance.double()
+    variance = exact.diagonal().mean()
+    if not variance > 0:
+        raise ValueError(
+            "Expected real features that vary, got the same everywhere; take the centre of more "
+            "real recordings or set eqs.features=centred"
+        )
+    unit = torch.eye(len(exact), dtype=exact.dtype, device=exact.device)
+    factor = torch.linalg.cholesky((1 - shrinkage) * exact + shrinkage * variance * unit)
+    return torch.linalg.solve_triangular(factor, unit, upper=False)
 
 
 def mean_over_stages(stages: Sequence[Tensor]) -> Tensor:

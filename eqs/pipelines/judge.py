@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 EMBEDDED_DATA = "dsec_mini"
 # What an EQS configuration says about the definition; the rest says where the judge is.
 CHOICES = (
-    "stages", "patch", "patch_size", "mask", "state",
+    "tap", "features", "stages", "patch", "patch_size", "mask", "state",
     "bins", "window_us", "count_cutoff", "span", "warmup_windows",
 )  # fmt: skip
 
@@ -106,7 +106,7 @@ def _trained_judge(cfg: DictConfig, run: Run) -> Judge:
     return Judge(
         backbone=backbone,
         weights_sha256=digest,
-        readings=_readings(cfg, taps, definition, centres),
+        readings=_readings(taps, definition, centres),
         description=f"RVT-{config.model.size} trained on the recorded events of "
         f"{config.data.name}, {world}",
         untrained=_untrained(cfg, config.model),
@@ -137,7 +137,7 @@ def _given_judge(cfg: DictConfig, data: Dataset | None) -> Judge:
     return Judge(
         backbone=backbone,
         weights_sha256=digest,
-        readings=_readings(cfg, taps, definition, centres),
+        readings=_readings(taps, definition, centres),
         description="random weights, a control"
         if cfg.eqs.weights == "random"
         else "weights given with eqs.weights",
@@ -159,27 +159,29 @@ def _untrained(cfg: DictConfig, network: DictConfig) -> TappedBackbone:
 def _definition(cfg: DictConfig, size: str, split: int) -> Definition:
     choices = {name: cfg.eqs[name] for name in CHOICES}
     choices["stages"] = tuple(choices["stages"])
-    return Definition(**choices, tap=cfg.eqs.tap, architecture=f"rvt-{size}-split{split}")
+    return Definition(**choices, architecture=f"rvt-{size}-split{split}")
 
 
 def _readings(
-    cfg: DictConfig, taps: Sequence[str], definition: Definition, centres: dict[str, Centre]
+    taps: Sequence[str], definition: Definition, centres: dict[str, Centre]
 ) -> tuple[Reading, ...]:
-    readings = [Reading(definition=replace(definition, tap=tap)) for tap in taps]
+    """Every tap raw and centred, and whitened where the headline is; the headline first."""
+    readings = [Reading(definition=replace(definition, tap=tap, features="raw")) for tap in taps]
     readings += [
-        Reading(definition=replace(definition, tap=tap, features="centred"), centre=centre)
+        Reading(definition=replace(definition, tap=tap, features=features), centre=centre)
+        for features in sorted({"centred", definition.features} - {"raw"})
         for tap, centre in centres.items()
     ]
 
     def distance_to_headline(reading: Reading) -> tuple[bool, bool]:
         chosen = reading.definition
-        return chosen.tap != cfg.eqs.tap, chosen.features != cfg.eqs.features
+        return chosen.tap != definition.tap, chosen.features != definition.features
 
     return tuple(sorted(readings, key=distance_to_headline))
 
 
 def _centre_path(folder: Path, tap: str, definition: Definition) -> Path:
-    """One file per tap and binning: the centre depends on both."""
+    """One file per tap and binning, centred or whitened: the statistics depend on no more."""
     centred = replace(definition, tap=tap, features="centred")
     return folder / f"centre-{centred.hash}.npz"
 

@@ -141,7 +141,9 @@ def untrained_scores(
     judge: Judge, real: EventReader, candidates: Sequence[EventReader], start_us: int, stop_us: int
 ) -> list[float]:
     """The headline with the untrained network, centred on this recording's own real features."""
-    definition = replace(judge.headline.definition, features="centred")
+    definition = judge.headline.definition
+    if definition.features == "raw":
+        definition = replace(definition, features="centred")
     centres = feature_centres(judge.untrained, [real], taps=[definition.tap], definition=definition)
     reading = Reading(definition=definition, centre=centres[definition.tap])
     found = score_streams(

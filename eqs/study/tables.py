@@ -105,9 +105,9 @@ def scaled_score(
 
 
 def score_columns(table: pd.DataFrame) -> list[str]:
-    """The headline `eqs` and every variant column `eqs_<tap>_<raw|centred>` of a table."""
+    """The headline `eqs` and every variant column `eqs_<tap>_<raw|centred|whitened>` of a table."""
     variants = (name for name in table.columns if name.startswith("eqs_"))
-    return ["eqs", *(name for name in variants if name.endswith(("_raw", "_centred")))]
+    return ["eqs", *(name for name in variants if name.endswith(("_raw", "_centred", "_whitened")))]
 
 
 def baseline_columns(table: pd.DataFrame) -> list[str]:

@@ -60,6 +60,7 @@ def test_warmup_is_at_most_a_quarter(windows, warmup):
             {"patch_size": "three"},
             "patch_size to be a whole number .*got 'three'; set eqs.patch_size",
         ),
+        ({"features": "white"}, "features raw or centred or whitened, got 'white'"),
         ({"span": "all"}, "span window or events"),
         ({"patch": "hex"}, "patch cells or grid, got 'hex'; set eqs.patch"),
         ({"state": "kept"}, "state carried or reset"),

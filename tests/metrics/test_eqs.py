@@ -16,7 +16,9 @@ from eqs.metrics import (
     patch_cosine,
     pool_patches,
     score_streams,
+    whitening_matrix,
 )
+from eqs.metrics.definition import KINDS
 
 BASE = Definition(bins=2, window_us=50_000)
 TAPS = ("gate", "hidden", "downsample")
@@ -25,8 +27,9 @@ TAPS = ("gate", "hidden", "downsample")
 def readings(*taps, centres=None):
     raw = [Reading(definition=replace(BASE, tap=tap)) for tap in taps]
     return raw + [
-        Reading(definition=replace(BASE, tap=tap, features="centred"), centre=centre)
+        Reading(definition=replace(BASE, tap=tap, features=features), centre=centre)
         for tap, centre in (centres or {}).items()
+        for features in ("centred", "whitened")
     ]
 
 
@@ -38,7 +41,7 @@ def centres(backbone, make_events):
 def test_identical_streams_score_one(backbone, make_events, centres):
     events = make_events(1)
     (scores,) = score_streams(backbone, events, [events], readings(*TAPS, centres=centres))
-    assert set(scores) == {f"{tap}_{kind}" for tap in TAPS for kind in ("raw", "centred")}
+    assert set(scores) == {f"{tap}_{kind}" for tap in TAPS for kind in KINDS["features"]}
     for score in scores.values():
         assert score.score == pytest.approx(1, abs=1e-6)
         np.testing.assert_allclose(score.map, 1, atol=1e-6)
@@ -318,7 +321,48 @@ def test_centre_belongs_to_its_tap(centres):
         Reading(definition=replace(BASE, tap="gate", features="centred"), centre=centres["hidden"])
 
 
-def test_centre_is_the_mean_pooled_feature_after_warmup(backbone):
+def test_whitened_features_need_covariances(centres, tmp_path):
+    whole = centres["hidden"]
+    alone = Centre(tap="hidden", stages=(1, 2, 3), means=whole.means)
+    alone.save(tmp_path / "means.npz")
+    loaded = Centre.load(tmp_path / "means.npz")
+    assert loaded.sha256 == alone.sha256 != whole.sha256
+    Reading(definition=replace(BASE, features="centred"), centre=loaded)
+    with pytest.raises(ValueError, match=r"with covariances .*, got means alone; compute the"):
+        Reading(definition=replace(BASE, features="whitened"), centre=loaded)
+
+
+def test_whitening_comes_before_the_cosine(backbone, centres):
+    real, simulated = torch.randint(0, 4, (2, 6, 4, 16, 24)).to(torch.uint8)
+    definition = replace(BASE, features="whitened", warmup_windows=0)
+    reading = Reading(definition=definition, centre=centres["hidden"])
+    (scores,) = score_streams(backbone, real, [simulated], [reading], chunk_windows=4)
+    maps, _ = backbone.taps(torch.stack([real, simulated], dim=1).float(), None)
+    by_stage = []
+    for index, stage in enumerate(maps["hidden"]):
+        mean, covariance = (
+            torch.from_numpy(part[index]).double()
+            for part in (centres["hidden"].means, centres["hidden"].covariances)
+        )
+        centred = pool_patches(stage).double() - mean[:, None, None]
+        white = torch.einsum("dc,tscij->tsdij", whitening_matrix(covariance), centred)
+        by_stage.append(torch.cosine_similarity(white[:, 0], white[:, 1], dim=1).mean().item())
+    assert scores["hidden_whitened"].by_stage == pytest.approx(by_stage, abs=1e-5)
+
+
+def test_a_centre_of_few_features_still_whitens(backbone, make_events):
+    one_window = torch.randint(0, 4, (1, 4, 32, 24)).to(torch.uint8)  # two patches in stage 3
+    few = feature_centres(backbone, [one_window], taps=["hidden"], definition=BASE)["hidden"]
+    assert np.linalg.matrix_rank(few.covariances[2]) < len(few.means[2])
+    reading = Reading(definition=replace(BASE, features="whitened"), centre=few)
+    same, other = score_streams(
+        backbone, make_events(1), [make_events(1), make_events(2)], [reading]
+    )
+    assert same["hidden_whitened"].score == pytest.approx(1, abs=1e-6)
+    assert -1 <= other["hidden_whitened"].score < 0.999
+
+
+def test_centre_is_the_mean_and_covariance_of_pooled_features_after_warmup(backbone):
     recordings = [torch.randint(0, 4, (n, 4, 16, 24)).to(torch.uint8) for n in (8, 3)]
     centre = feature_centres(
         backbone, recordings, taps=["hidden"], definition=BASE, chunk_windows=1
@@ -330,6 +374,8 @@ def test_centre_is_the_mean_pooled_feature_after_warmup(backbone):
         ]
         vectors = torch.cat([part.movedim(2, -1).flatten(0, -2) for part in kept])
         np.testing.assert_allclose(centre.means[stage], vectors.mean(0).detach(), atol=1e-6)
+        expected = np.cov(vectors.detach().double().numpy().T, bias=True)
+        np.testing.assert_allclose(centre.covariances[stage], expected, atol=1e-6)
 
 
 def test_centre_survives_a_file(centres, tmp_path):
@@ -337,6 +383,8 @@ def test_centre_survives_a_file(centres, tmp_path):
     loaded = Centre.load(tmp_path / "judge" / "gate.npz")
     assert loaded.sha256 == centres["gate"].sha256 != centres["hidden"].sha256
     assert loaded.patches == centres["gate"].patches > 0
+    for before, after in zip(centres["gate"].covariances, loaded.covariances, strict=True):
+        np.testing.assert_array_equal(before, after)
     assert [path.name for path in (tmp_path / "judge").iterdir()] == ["gate.npz"]
 
 

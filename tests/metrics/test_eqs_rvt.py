@@ -48,8 +48,9 @@ def readings(judge):
     centres = feature_centres(judge, [moving_edges(8), moving_edges(9)], taps=TAPS, definition=BASE)
     raw = [Reading(definition=replace(BASE, tap=tap)) for tap in TAPS]
     return raw + [
-        Reading(definition=replace(BASE, tap=tap, features="centred"), centre=centre)
+        Reading(definition=replace(BASE, tap=tap, features=features), centre=centre)
         for tap, centre in centres.items()
+        for features in ("centred", "whitened")
     ]
 
 
@@ -64,7 +65,7 @@ def scores(judge, readings):
 
 
 def test_identity_for_every_tap(scores):
-    assert len(scores["identical"]) == 2 * len(TAPS)
+    assert len(scores["identical"]) == 3 * len(TAPS)
     for name, score in scores["identical"].items():
         assert score.score == pytest.approx(1, abs=1e-6), name
 

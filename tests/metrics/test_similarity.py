@@ -2,10 +2,18 @@
 
 import math
 
+import numpy as np
 import pytest
 import torch
 
-from eqs.metrics import combine_maps, mean_over_stages, patch_cosine, pool_grid, pool_patches
+from eqs.metrics import (
+    combine_maps,
+    mean_over_stages,
+    patch_cosine,
+    pool_grid,
+    pool_patches,
+    whitening_matrix,
+)
 
 
 def vectors(*columns):
@@ -49,6 +57,35 @@ def test_centre_moves_the_origin():
 def test_centre_of_another_width_is_refused():
     with pytest.raises(ValueError, match=r"centre of 2 channels, got shape \(3,\)"):
         patch_cosine(vectors((1, 0)), vectors((1, 0)), torch.zeros(3))
+
+
+def test_two_channels_whitened_by_hand():
+    whitening = whitening_matrix(torch.diag(torch.tensor([1.0, 4.0])))
+    a, b = vectors((1, 1), (1, 0), (0, 0)), vectors((1, -1), (3, 0), (0, 0))
+    # A tenth of the mean variance 2.5 takes the place of a tenth of each: 1.15 and 3.85.
+    expected = (1 / 1.15 - 1 / 3.85) / (1 / 1.15 + 1 / 3.85)
+    assert patch_cosine(a, b, None, whitening).tolist() == [pytest.approx([expected, 1, 1])]
+
+
+def test_whitening_by_a_triangle_scores_as_the_symmetric_one_does():
+    generator = np.random.default_rng(0)
+    features = generator.normal(size=(500, 6)) @ generator.normal(size=(6, 6)) + 3
+    mean, covariance = features.mean(0), np.cov(features.T)
+    shrunk = 0.9 * covariance + 0.1 * np.trace(covariance) / 6 * np.eye(6)
+    variances, axes = np.linalg.eigh(shrunk)
+    symmetric = axes @ np.diag(variances**-0.5) @ axes.T
+    a, b = (symmetric @ (x - mean) for x in features[:2])
+    expected = a @ b / np.linalg.norm(a) / np.linalg.norm(b)
+    x, y = (torch.from_numpy(each)[:, None, None] for each in features[:2])
+    found = patch_cosine(x, y, torch.from_numpy(mean), whitening_matrix(torch.tensor(covariance)))
+    assert found.item() == pytest.approx(expected, abs=1e-12)
+    matrix = whitening_matrix(torch.tensor(covariance)).numpy()
+    np.testing.assert_allclose(matrix @ shrunk @ matrix.T, np.eye(6), atol=1e-12)
+
+
+def test_features_that_do_not_vary_cannot_be_whitened():
+    with pytest.raises(ValueError, match="real features that vary, got the same everywhere"):
+        whitening_matrix(torch.zeros(3, 3))
 
 
 def test_silence_has_a_defined_gradient():

@@ -3,10 +3,12 @@
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hydra import compose, initialize_config_dir
 
 from eqs.files import write_json
+from eqs.metrics import Centre, Definition
 from eqs.pipelines import judge
 from eqs.pipelines.runs import Run, recipe_hash
 
@@ -52,3 +54,25 @@ def test_detectors_of_simulated_streams_do_not_judge(chosen, tmp_path):
     finished(tmp_path, "a", simulator="esim")
     with pytest.raises(ValueError, match="Expected a judge trained on real events, got none"):
         chosen()
+
+
+@pytest.mark.parametrize(
+    ("features", "expected"),
+    [
+        ("centred", "hidden_centred hidden_raw gate_centred gate_raw"),
+        ("raw", "hidden_raw hidden_centred gate_raw gate_centred"),
+        (
+            "whitened",
+            "hidden_whitened hidden_raw hidden_centred gate_whitened gate_raw gate_centred",
+        ),
+    ],
+)
+def test_whitened_readings_appear_when_asked_for(features, expected):
+    array = np.eye(2, dtype=np.float32)
+    centres = {
+        tap: Centre(tap=tap, stages=(1,), means=(array[0],), covariances=(array,))
+        for tap in ("hidden", "gate")
+    }
+    definition = Definition(features=features, stages=(1,))
+    readings = judge._readings(["hidden", "gate"], definition, centres)
+    assert [reading.name for reading in readings] == expected.split()
