@@ -15,7 +15,7 @@ from eqs.metrics.similarity import (
     pool_patches,
     whitening_matrix,
 )
-from eqs.metrics.windows import group_chunks, histogram_chunks, window_starts
+from eqs.metrics.windows import group_chunks, histogram_chunks, normalised_counts, window_starts
 
 __all__ = [
     "EXPECTED_ORDER",
@@ -35,6 +35,7 @@ __all__ = [
     "histogram_chunks",
     "load_backbone",
     "mean_over_stages",
+    "normalised_counts",
     "patch_cosine",
     "pool_grid",
     "pool_patches",

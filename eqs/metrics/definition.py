@@ -19,6 +19,7 @@ KINDS = {
     "state": ("carried", "reset"),
     "mask": ("none", "active"),
     "span": ("window", "events"),
+    "counts": ("raw", "normalised"),
 }
 
 # Choices that have one reading here. They are part of the hash, so that a later alternative
@@ -26,6 +27,7 @@ KINDS = {
 FIXED_RULES = {
     "aggregation": "mean over patches, stages with equal weights, windows, sequences",
     "distance": "cosine",
+    "normalised": "each window to 35 events per pixel and second, then at most count_cutoff",
     "pooling": "mean of real cells, patches do not overlap, padded right and bottom",
     "start": "state zero, one per stream",
     "warmup": "first min(warmup_windows, n // 4) windows",
@@ -57,6 +59,7 @@ class Definition:
         window_us: length of a window in microseconds.
         count_cutoff: events per pixel and bin at which the histogram saturates.
         span: time the bins cover, the whole `window` or first to last of its `events`.
+        counts: `raw`, or `normalised`: each window is scaled to one mean count.
         warmup_windows: most windows dropped while the state settles.
         architecture: name of the backbone with whatever changes its output besides weights.
 
@@ -79,6 +82,7 @@ class Definition:
     window_us: int = 50_000
     count_cutoff: int = 10
     span: Literal["window", "events"] = "window"
+    counts: Literal["raw", "normalised"] = "raw"
     warmup_windows: int = 20
     architecture: str = "rvt-small"
 

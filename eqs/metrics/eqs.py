@@ -55,6 +55,7 @@ class EventQualityScore(Metric):
         window_us: length of a window in microseconds.
         count_cutoff: events per pixel and bin at which the histogram saturates.
         span: time the bins cover, the whole `window` or first to last of its `events`.
+        counts: `raw`, or `normalised`: each window is scaled to one mean count.
         warmup_windows: most windows dropped at the start; never more than a quarter of a stream.
         size: size of the RVT backbone.
         partition_split_32: attention windows per side of the backbone's last stage.
@@ -94,6 +95,7 @@ class EventQualityScore(Metric):
         window_us: int = 50_000,
         count_cutoff: int = 10,
         span: Literal["window", "events"] = "window",
+        counts: Literal["raw", "normalised"] = "raw",
         warmup_windows: int = 20,
         size: str = "small",
         partition_split_32: int = 2,
@@ -122,6 +124,7 @@ class EventQualityScore(Metric):
             window_us=window_us,
             count_cutoff=count_cutoff,
             span=span,
+            counts=counts,
             warmup_windows=warmup_windows,
             architecture=f"rvt-{size}-split{partition_split_32}"
             if backbone is None

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from eqs.metrics.definition import Definition
 from eqs.metrics.similarity import pool_grid, pool_patches
+from eqs.metrics.windows import normalised_counts
 
 RVT_STRIDES = (4, 8, 16, 32)
 ACTIVE = "active"
@@ -67,7 +68,7 @@ def pooled_features(
         backbone: network with `taps`; it runs in evaluation mode and in float32.
         chunks: histograms, shape (windows, streams, channels, height, width) each.
         taps: activations to pool.
-        definition: stages, patches and state.
+        definition: stages, patches, counts and state.
         device: where the backbone lives.
 
     Yields:
@@ -85,7 +86,9 @@ def pooled_features(
     for chunk in chunks:
         (windows, streams), (height, width) = chunk.shape[:2], chunk.shape[-2:]
         with _evaluation(backbone), torch.no_grad(), _full_precision(device):
-            x = chunk.to(device=device, dtype=torch.float32)
+            counts = x = chunk.to(device=device, dtype=torch.float32)
+            if definition.counts == "normalised":
+                x = normalised_counts(counts, definition)
             if definition.state == "reset":  # as many streams of one window each
                 x, states = x.flatten(0, 1)[None], None
             maps, states = backbone.taps(x, states, stages=stages, names=tuple(taps))
@@ -99,8 +102,8 @@ def pooled_features(
                 for name in taps
             }
             if definition.mask == "active":
-                counts = chunk.to(device=device, dtype=torch.float32).sum(dim=2, keepdim=True)
-                pooled[ACTIVE] = [pool(pool_patches(counts, px), side) > 0 for px in strides]
+                total = counts.sum(dim=2, keepdim=True)
+                pooled[ACTIVE] = [pool(pool_patches(total, px), side) > 0 for px in strides]
         yield pooled
 
 

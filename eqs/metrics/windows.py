@@ -18,6 +18,9 @@ from eqs.representations import stacked_histogram
 PIXELS_PER_CHUNK = 8 * 480 * 640
 LONGEST_CHUNK = 32
 
+# The mean of DSEC: 10.6 million events per second on 640 x 480 pixels.
+EVENTS_PER_PIXEL_AND_SECOND = 35.0
+
 
 # A stream in memory or in a file, or its histograms (windows, 2 * bins, height, width).
 EventSource = Events | EventReader
@@ -177,6 +180,35 @@ def histogram_chunks(
             for start in starts_us[first : first + length]
         ]
         yield torch.from_numpy(np.stack([np.stack(windows) for windows in chunk]))
+
+
+def normalised_counts(histograms: Tensor, definition: Definition) -> Tensor:
+    """Histograms scaled so that each window of each stream has the same mean count.
+
+    Convention: the mean is that of `EVENTS_PER_PIXEL_AND_SECOND`, one number for all streams and
+    not one between the two that are compared. So a window does not depend on what it is compared
+    with: the score is symmetric, the real stream needs one pass for all candidates, and the mean
+    real feature is computed at the same scale. Counts saturate at the cutoff as before, so that
+    the only events of a window do not become a flash that no detector was trained on. A window
+    without events stays as it is.
+
+    Args:
+        histograms: counts, float, shape (..., 2 * bins, height, width).
+        definition: bins, window length and cutoff.
+
+    Returns:
+        Same shape.
+
+    Example:
+        >>> counts = torch.tensor([[[0.0, 1.0]], [[0.0, 2.0]]])
+        >>> torch.equal(*(normalised_counts(n * counts, Definition(bins=1)) for n in (1, 4)))
+        True
+    """
+    window_s = definition.window_us * 1e-6
+    wanted = EVENTS_PER_PIXEL_AND_SECOND * window_s / (2 * definition.bins)
+    mean = histograms.mean(dim=(-3, -2, -1), keepdim=True)
+    scaled = histograms * (wanted / mean.masked_fill(mean == 0, 1.0))
+    return scaled.clamp_max(definition.count_cutoff)
 
 
 def _histogram(stream: EventSource, start_us: int, definition: Definition) -> NDArray[np.uint8]:

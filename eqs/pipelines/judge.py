@@ -29,7 +29,7 @@ EMBEDDED_DATA = "dsec_mini"
 # What an EQS configuration says about the definition; the rest says where the judge is.
 CHOICES = (
     "tap", "features", "stages", "patch", "patch_size", "mask", "state",
-    "bins", "window_us", "count_cutoff", "span", "warmup_windows",
+    "bins", "window_us", "count_cutoff", "span", "counts", "warmup_windows",
 )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ OTHER = {
     "window_us": 40_000,
     "count_cutoff": 8,
     "span": "events",
+    "counts": "normalised",
     "warmup_windows": 10,
     "architecture": "other",
 }
@@ -35,6 +36,10 @@ def test_every_choice_changes_the_hash():
 def test_hash_is_short_and_repeats():
     assert Definition().hash == Definition().hash
     assert len(Definition().hash) == 12
+
+
+def test_no_fixed_rule_hides_a_choice():
+    assert FIXED_RULES.keys().isdisjoint(field.name for field in fields(Definition))
 
 
 def test_fixed_rules_are_part_of_the_hash(monkeypatch):
@@ -61,6 +66,7 @@ def test_warmup_is_at_most_a_quarter(windows, warmup):
             "patch_size to be a whole number .*got 'three'; set eqs.patch_size",
         ),
         ({"features": "white"}, "features raw or centred or whitened, got 'white'"),
+        ({"counts": "none"}, "counts raw or normalised, got 'none'; set eqs.counts"),
         ({"span": "all"}, "span window or events"),
         ({"patch": "hex"}, "patch cells or grid, got 'hex'; set eqs.patch"),
         ({"state": "kept"}, "state carried or reset"),

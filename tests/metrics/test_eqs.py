@@ -178,6 +178,50 @@ def test_a_mask_leaves_out_what_is_silent_in_both(backbone):
     assert np.isnan(found.map[:, found.map.shape[1] // 2 :]).all()
 
 
+def test_normalised_counts_leave_the_number_of_events_out(backbone):
+    few, other = torch.randint(0, 3, (2, 6, 4, 16, 24)).to(torch.uint8)
+    few[2] = other[2] = 0
+    candidates = [3 * few, other, torch.zeros_like(few)]
+
+    def scores_of(counts, reference):
+        ways = [Reading(definition=replace(BASE, counts=counts))]
+        found = score_streams(backbone, reference, candidates, ways)
+        return [by_reading["hidden_raw"].score for by_reading in found]
+
+    same, different, blank = scores_of("normalised", few)
+    assert same == pytest.approx(1, abs=1e-6)
+    assert max(different, blank) < 0.99
+    assert scores_of("raw", few)[0] < 0.999
+    assert scores_of("normalised", torch.zeros_like(few))[2] == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("other", [{"counts": "normalised"}])
+def test_identity_symmetry_and_chunks_of_other_choices(backbone, make_events, other):
+    definition = replace(BASE, features="centred", **other)
+    a, b = make_events(1), make_events(2, count=1500)
+    centre = feature_centres(backbone, [make_events(11)], taps=["hidden"], definition=definition)
+    ways = [Reading(definition=definition, centre=centre["hidden"])]
+
+    def scores_of(reference, candidates, chunk_windows=None):
+        found = score_streams(
+            backbone,
+            reference,
+            candidates,
+            ways,
+            start_us=0,
+            stop_us=1_000_000,
+            chunk_windows=chunk_windows,
+        )
+        return [by_reading["hidden_centred"].score for by_reading in found]
+
+    identity, there = scores_of(a, [a, b])
+    assert identity == pytest.approx(1, abs=1e-6)
+    assert there < 0.999
+    assert scores_of(b, [a]) == pytest.approx([there], abs=1e-5)
+    for length in (1, 7):
+        assert scores_of(a, [b], length) == pytest.approx([there], abs=1e-5)
+
+
 def test_silence_equals_silence_under_a_mask(backbone):
     blank = torch.zeros(4, 4, 16, 24, dtype=torch.uint8)
     ways = [Reading(definition=replace(BASE, mask="active"))]

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from eqs.events import EventReader, Events
-from eqs.metrics import Definition, group_chunks, window_starts
+from eqs.metrics import Definition, group_chunks, normalised_counts, window_starts
 from eqs.metrics.windows import chunk_length
 from eqs.representations import stacked_histogram
 
@@ -89,6 +89,27 @@ def test_chunks_shrink_as_frames_grow():
     assert chunk_length(2, 480, 640) == 4
     assert chunk_length(2, 96, 128) == 32
     assert chunk_length(99, 720, 1280) == 1
+
+
+def test_normalised_windows_have_the_mean_count_of_the_rate():
+    definition = Definition(bins=2, window_us=20_000, count_cutoff=255)
+    histograms = np.random.default_rng(0).integers(0, 9, (3, 2, 4, 6, 8)).astype(np.float32)
+    histograms[1, 0] = 0
+    expected = np.zeros_like(histograms)
+    for index in np.ndindex(3, 2):
+        if index != (1, 0):
+            events = histograms[index].sum()
+            expected[index] = histograms[index] * (35 * 0.02 * 6 * 8) / events
+    found = normalised_counts(torch.from_numpy(histograms), definition)
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_normalised_counts_saturate():
+    lonely = torch.zeros(4, 480, 640)
+    lonely[0, 0, 0] = 1
+    found = normalised_counts(lonely, Definition(bins=2))
+    assert found.max() == 10
+    assert torch.count_nonzero(found) == 1
 
 
 def test_files_and_memory_give_the_same_chunks(make_events, tmp_path):
