@@ -6,15 +6,9 @@ from eqs.metrics.definition import TAPS, Definition, weights_sha256
 from eqs.metrics.detection import MeanAveragePrecision
 from eqs.metrics.eqs import EventQualityScore, load_backbone
 from eqs.metrics.features import TappedBackbone, pooled_features
+from eqs.metrics.pooling import pool_grid, pool_patches, smooth_grid, smooth_patches
 from eqs.metrics.scoring import Reading, StreamScore, score_group, score_streams
-from eqs.metrics.similarity import (
-    combine_maps,
-    mean_over_stages,
-    patch_cosine,
-    pool_grid,
-    pool_patches,
-    whitening_matrix,
-)
+from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine, whitening_matrix
 from eqs.metrics.windows import group_chunks, histogram_chunks, normalised_counts, window_starts
 
 __all__ = [
@@ -43,6 +37,8 @@ __all__ = [
     "score_group",
     "score_streams",
     "singles",
+    "smooth_grid",
+    "smooth_patches",
     "weights_sha256",
     "whitening_matrix",
     "window_starts",

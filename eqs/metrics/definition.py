@@ -16,6 +16,7 @@ TAPS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 KINDS = {
     "features": ("raw", "centred", "whitened"),
     "patch": ("cells", "grid"),
+    "pooling": ("box", "smooth"),
     "state": ("carried", "reset"),
     "mask": ("none", "active"),
     "span": ("window", "events"),
@@ -28,7 +29,8 @@ FIXED_RULES = {
     "aggregation": "mean over patches, stages with equal weights, windows, sequences",
     "distance": "cosine",
     "normalised": "each window to 35 events per pixel and second, then at most count_cutoff",
-    "pooling": "mean of real cells, patches do not overlap, padded right and bottom",
+    "border": "weights of real cells alone, padded right and bottom",
+    "smooth": "triangle over the patch and half of each neighbour",
     "start": "state zero, one per stream",
     "warmup": "first min(warmup_windows, n // 4) windows",
     "whitened": "covariance of real features, shrunk by 0.1 towards its mean variance",
@@ -53,6 +55,8 @@ class Definition:
         stages: stages of the backbone, counted from 1.
         patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
         patch_size: side of a patch in cells, or patches per side of the map.
+        pooling: `box`, the mean of a patch's cells, or `smooth`, weights that fall off into the
+            neighbouring patches.
         state: `carried` from window to window, or `reset` to zero before each.
         mask: `none`, or `active`: only patches in which either stream has events count.
         bins: time bins per window and polarity.
@@ -76,6 +80,7 @@ class Definition:
     stages: tuple[int, ...] = (1, 2, 3)
     patch: Literal["cells", "grid"] = "cells"
     patch_size: int = 3
+    pooling: Literal["box", "smooth"] = "box"
     state: Literal["carried", "reset"] = "carried"
     mask: Literal["none", "active"] = "none"
     bins: int = 10

@@ -49,6 +49,8 @@ class EventQualityScore(Metric):
         stages: stages of the backbone, counted from 1.
         patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
         patch_size: side of a patch in cells, or patches per side of the map.
+        pooling: `box`, the mean of a patch's cells, or `smooth`, weights that fall off into the
+            neighbouring patches.
         state: `carried` from window to window, or `reset` to zero before each.
         mask: `none`, or `active`: only patches in which either stream has events count.
         bins: time bins per window and polarity.
@@ -89,6 +91,7 @@ class EventQualityScore(Metric):
         stages: Sequence[int] = (1, 2, 3),
         patch: Literal["cells", "grid"] = "cells",
         patch_size: int = 3,
+        pooling: Literal["box", "smooth"] = "box",
         state: Literal["carried", "reset"] = "carried",
         mask: Literal["none", "active"] = "none",
         bins: int = 10,
@@ -118,6 +121,7 @@ class EventQualityScore(Metric):
             stages=tuple(stages),
             patch=patch,
             patch_size=patch_size,
+            pooling=pooling,
             state=state,
             mask=mask,
             bins=bins,

@@ -10,12 +10,19 @@ import torch
 from torch import Tensor, nn
 
 from eqs.metrics.definition import Definition
-from eqs.metrics.similarity import pool_grid, pool_patches
+from eqs.metrics.pooling import pool_grid, pool_patches, smooth_grid, smooth_patches
 from eqs.metrics.windows import normalised_counts
 
 RVT_STRIDES = (4, 8, 16, 32)
 ACTIVE = "active"
 """Name, beside those of the taps, of whether a patch has events."""
+
+POOLS = {
+    ("cells", "box"): pool_patches,
+    ("cells", "smooth"): smooth_patches,
+    ("grid", "box"): pool_grid,
+    ("grid", "smooth"): smooth_grid,
+}
 
 # Whatever a backbone carries from one window to the next; only the backbone looks inside.
 States = Any
@@ -80,7 +87,7 @@ def pooled_features(
         ValueError: the backbone has fewer stages.
     """
     stages, side = definition.stages, definition.patch_size
-    pool = pool_patches if definition.patch == "cells" else pool_grid
+    pool = POOLS[definition.patch, definition.pooling]
     strides = strides_of(backbone, stages)
     states: States = None
     for chunk in chunks:

@@ -5,53 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import torch
-import torch.nn.functional as F
 from torch import Tensor
-
-
-def pool_patches(maps: Tensor, size: int = 3) -> Tensor:
-    """Mean feature vector of every patch of `size` by `size` neighbouring cells.
-
-    Convention: patches do not overlap. Where the map is no multiple of `size`, it is padded with
-    zeros on the right and at the bottom, and a ragged patch is divided by its real cells. The
-    divisor leaves a raw cosine as it is; a centred cosine needs the true mean.
-
-    Args:
-        maps: feature maps, shape (..., channels, rows, columns).
-        size: side of a patch in cells.
-
-    Returns:
-        Shape (..., channels, patch rows, patch columns), both counts rounded up.
-
-    Example:
-        >>> pool_patches(torch.ones(2, 4, 3)).shape
-        torch.Size([2, 2, 1])
-    """
-    if size < 1:
-        raise ValueError(f"Expected patches of at least one cell, got {size}; set patch_size")
-    flat = maps.reshape(-1, *maps.shape[-3:])
-    pooled = F.avg_pool2d(flat, size, ceil_mode=True)
-    return pooled.reshape(*maps.shape[:-2], *pooled.shape[-2:])
-
-
-def pool_grid(maps: Tensor, side: int = 3) -> Tensor:
-    """Mean feature vector of every part of a map cut into `side` by `side` parts.
-
-    Convention: parts that do not come out even share their border cells.
-
-    Args:
-        maps: feature maps, shape (..., channels, rows, columns).
-        side: parts per side.
-
-    Returns:
-        Shape (..., channels, side, side).
-
-    Example:
-        >>> pool_grid(torch.arange(4.0).view(1, 1, 4), side=1)
-        tensor([[[1.5000]]])
-    """
-    flat = maps.reshape(-1, *maps.shape[-3:])
-    return F.adaptive_avg_pool2d(flat, side).reshape(*maps.shape[:-2], side, side)
 
 
 def patch_cosine(

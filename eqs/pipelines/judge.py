@@ -28,8 +28,8 @@ log = logging.getLogger(__name__)
 EMBEDDED_DATA = "dsec_mini"
 # What an EQS configuration says about the definition; the rest says where the judge is.
 CHOICES = (
-    "tap", "features", "stages", "patch", "patch_size", "mask", "state",
-    "bins", "window_us", "count_cutoff", "span", "counts", "warmup_windows",
+    "tap", "features", "stages", "patch", "patch_size", "pooling", "mask",
+    "state", "bins", "window_us", "count_cutoff", "span", "counts", "warmup_windows",
 )  # fmt: skip
 
 

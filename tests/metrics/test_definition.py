@@ -14,6 +14,7 @@ OTHER = {
     "stages": (1, 2),
     "patch": "grid",
     "patch_size": 2,
+    "pooling": "smooth",
     "state": "reset",
     "mask": "active",
     "bins": 5,
@@ -69,6 +70,7 @@ def test_warmup_is_at_most_a_quarter(windows, warmup):
         ({"counts": "none"}, "counts raw or normalised, got 'none'; set eqs.counts"),
         ({"span": "all"}, "span window or events"),
         ({"patch": "hex"}, "patch cells or grid, got 'hex'; set eqs.patch"),
+        ({"pooling": "max"}, "pooling box or smooth, got 'max'; set eqs.pooling"),
         ({"state": "kept"}, "state carried or reset"),
         ({"mask": True}, "mask none or active, got True"),
         (

@@ -16,6 +16,7 @@ from eqs.metrics import (
     patch_cosine,
     pool_patches,
     score_streams,
+    smooth_patches,
     whitening_matrix,
 )
 from eqs.metrics.definition import KINDS
@@ -161,6 +162,20 @@ def test_a_grid_compares_parts_of_the_map(backbone):
     assert scores["hidden_raw"].patch_px is None
 
 
+def test_smooth_patches_are_compared_in_the_place_of_plain_ones(backbone):
+    real, simulated = torch.randint(0, 4, (2, 4, 4, 16, 24)).to(torch.uint8)
+    ways = [Reading(definition=replace(BASE, warmup_windows=0, pooling="smooth"))]
+    (scores,) = score_streams(backbone, real, [simulated], ways)
+    maps, _ = backbone.taps(torch.stack([real, simulated], dim=1).float(), None)
+    by_stage = []
+    for stage in maps["hidden"]:
+        pooled = smooth_patches(stage)
+        by_stage.append(patch_cosine(pooled[:, 0], pooled[:, 1]).mean().item())
+    assert scores["hidden_raw"].by_stage == pytest.approx(by_stage, abs=1e-6)
+    assert scores["hidden_raw"].patch_px == 6
+    assert scores["hidden_raw"].map.shape == (3, 4)
+
+
 def test_a_mask_leaves_out_what_is_silent_in_both(backbone):
     real, simulated = torch.randint(1, 4, (2, 4, 4, 24, 48)).to(torch.uint8)
     for stream in (real, simulated):
@@ -195,7 +210,15 @@ def test_normalised_counts_leave_the_number_of_events_out(backbone):
     assert scores_of("normalised", torch.zeros_like(few))[2] == pytest.approx(1, abs=1e-6)
 
 
-@pytest.mark.parametrize("other", [{"counts": "normalised"}])
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"counts": "normalised"},
+        {"pooling": "smooth"},
+        {"pooling": "smooth", "patch": "grid"},
+        {"pooling": "smooth", "mask": "active"},
+    ],
+)
 def test_identity_symmetry_and_chunks_of_other_choices(backbone, make_events, other):
     definition = replace(BASE, features="centred", **other)
     a, b = make_events(1), make_events(2, count=1500)

@@ -10,7 +10,6 @@ from eqs.metrics import (
     combine_maps,
     mean_over_stages,
     patch_cosine,
-    pool_grid,
     pool_patches,
     whitening_matrix,
 )
@@ -102,14 +101,6 @@ def test_gradient_agrees_with_finite_differences():
     )
 
 
-@pytest.mark.parametrize(
-    ("cells", "patches"),
-    [((120, 160), (40, 54)), ((60, 80), (20, 27)), ((30, 40), (10, 14)), ((1, 1), (1, 1))],
-)
-def test_patch_grid_rounds_up(cells, patches):
-    assert pool_patches(torch.zeros(2, *cells)).shape == (2, *patches)
-
-
 def test_padding_is_right_and_bottom_and_points_the_same_way_as_zeros():
     maps = torch.randn(2, 5, 4, 7)
     padded = torch.zeros(2, 5, 6, 9)
@@ -141,14 +132,3 @@ def test_maps_of_all_stages_land_on_the_pixels_they_cover():
     image = combine_maps([fine, coarse], [4, 8]) * 2
     assert image[0].tolist() == [0, 0, 1, 1, 2]
     assert image[2].tolist() == [3, 3, 4, 4, 5]
-
-
-def test_empty_patches_are_refused():
-    with pytest.raises(ValueError, match="at least one cell, got 0; set patch_size"):
-        pool_patches(torch.zeros(1, 2, 2), 0)
-
-
-def test_a_grid_averages_equal_parts():
-    maps = torch.arange(2 * 6 * 9.0).view(2, 6, 9)
-    found = pool_grid(maps, 3)
-    torch.testing.assert_close(found, maps.unflatten(2, (3, 3)).unflatten(1, (3, 2)).mean((2, 4)))

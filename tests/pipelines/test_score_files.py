@@ -40,6 +40,19 @@ def test_a_stream_against_itself_scores_one_everywhere(files, tmp_path):
     assert found["events"]["simulated"] == found["events"]["real"] > 0
 
 
+def test_counts_and_pooling_reach_the_score(files, tmp_path):
+    found = {}
+    for name, overrides in {
+        "default": [],
+        "counts": ["eqs.counts=normalised"],
+        "pooling": ["eqs.pooling=smooth"],
+    }.items():
+        run(files[1], files[0], tmp_path / name, "taps=[]", *overrides)
+        found[name] = json.loads((tmp_path / name / "score.json").read_text())
+    assert len({each["eqs"] for each in found.values()}) == 3
+    assert len({each["definition"] for each in found.values()}) == 3
+
+
 def test_files_beside_the_score(files, tmp_path):
     out = tmp_path / "out"
     run(files[1], files[0], out)

@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 from torchmetrics.functional.image import structural_similarity_index_measure
 
-from eqs.metrics.similarity import mean_over_stages, patch_cosine, pool_patches
+from eqs.metrics.pooling import pool_patches
+from eqs.metrics.similarity import mean_over_stages, patch_cosine
 
 PATCH_PIXELS = 12  # a patch of EQS at its finest: 3 cells at stride 4
 
