@@ -63,10 +63,16 @@ def find_judge(cfg: DictConfig, data: Dataset | None) -> Judge:
     Of several the one that followed the configured recipe is taken, else the newest.
 
     Raises:
-        ValueError: no weights are given and no detector was trained on a real stream.
+        ValueError: no weights are given and no detector was trained on a real stream, or a centre
+            is given without weights or of another activation than the headline's.
     """
     if cfg.eqs.weights is not None:
         return _given_judge(cfg, data)
+    if cfg.eqs.centre is not None:
+        raise ValueError(
+            f"Expected weights beside the centre {cfg.eqs.centre}, got none: a centre belongs to "
+            "one judge; set eqs.weights"
+        )
     for name in dict.fromkeys([cfg.data.name, EMBEDDED_DATA]):
         found = finished_runs(Path(cfg.paths.runs) / name)
         trained = [run for run in found if run.result()["simulator"] == "real"]
@@ -125,14 +131,17 @@ def _given_judge(cfg: DictConfig, data: Dataset | None) -> Judge:
     taps = list(dict.fromkeys([cfg.eqs.tap, *cfg.taps]))
     training = data.recordings("train") if isinstance(data, DSECFolder) else []
     centres: dict[str, Centre] = {}
-    if training:
+    if cfg.eqs.centre is not None:
+        centres = _given_centre(cfg)
+    elif training:
         folder = Path(cfg.paths.results) / cfg.data.name / f"judge-{digest[:12]}"
         centres = _stored_centres(folder, taps, definition) or _new_centres(
             backbone, training, taps, definition, folder
         )
     else:
         log.warning(
-            "There are no real training recordings to centre on: only raw scores are reported",
+            "There are no real training recordings to centre on: only raw scores are reported; "
+            "set eqs.centre to a file that belongs to the weights",
         )
     return Judge(
         backbone=backbone,
@@ -143,6 +152,16 @@ def _given_judge(cfg: DictConfig, data: Dataset | None) -> Judge:
         else "weights given with eqs.weights",
         untrained=_untrained(cfg, cfg.eqs),
     )
+
+
+def _given_centre(cfg: DictConfig) -> dict[str, Centre]:
+    centre = Centre.load(cfg.eqs.centre)
+    if centre.tap != cfg.eqs.tap:
+        raise ValueError(
+            f"Expected a centre of the activation {cfg.eqs.tap}, got one of {centre.tap} in "
+            f"{cfg.eqs.centre}; set eqs.centre or eqs.tap"
+        )
+    return {centre.tap: centre}
 
 
 def _untrained(cfg: DictConfig, network: DictConfig) -> TappedBackbone:

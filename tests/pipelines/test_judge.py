@@ -76,3 +76,24 @@ def test_whitened_readings_appear_when_asked_for(features, expected):
     definition = Definition(features=features, stages=(1,))
     readings = judge._readings(["hidden", "gate"], definition, centres)
     assert [reading.name for reading in readings] == expected.split()
+
+
+def given(tmp_path, *overrides):
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        options = ["eqs.weights=random", "eqs.size=tiny", f"eqs.centre={tmp_path / 'c.npz'}"]
+        return compose("evaluate", [*options, *overrides])
+
+
+def test_a_given_centre_belongs_to_given_weights(tmp_path):
+    widths = {"stages": (1, 2, 3), "means": tuple(np.ones(n, np.float32) for n in (32, 64, 128))}
+    centre = Centre(tap="hidden", **widths)
+    centre.save(tmp_path / "c.npz")
+    found = judge.find_judge(given(tmp_path), None)
+    assert found.headline.name == "hidden_centred"
+    assert found.headline.centre.sha256 == centre.sha256
+    assert {reading.name for reading in found.readings} >= {"hidden_raw", "gate_raw"}
+    assert "gate_centred" not in {reading.name for reading in found.readings}
+    with pytest.raises(ValueError, match=r"centre of the activation gate, got one of hidden"):
+        judge.find_judge(given(tmp_path, "eqs.tap=gate"), None)
+    with pytest.raises(ValueError, match=r"Expected weights beside the centre .*set eqs\.weights"):
+        judge.find_judge(given(tmp_path, "eqs.weights=null"), None)
