@@ -111,6 +111,10 @@ class DSECFolder:
         rows, columns = parse_size(self.size)
         return [Recording.load(found[name], rows, columns) for name in chosen]
 
+    def all_recordings(self) -> list[Recording]:
+        """The recordings of every split."""
+        return [recording for split in self.splits for recording in self.recordings(split)]
+
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingFolder:
@@ -168,6 +172,10 @@ class RecordingFolder:
                 "set data.root"
             )
         return [Recording.load(path) for name, path in found.items() if name not in skipped]
+
+    def all_recordings(self) -> list[Recording]:
+        """All recordings with frames and events."""
+        return self.recordings()
 
 
 def parse_size(size: str) -> tuple[int, int]:

@@ -9,8 +9,6 @@ from eqs.pipelines.build import Dataset, dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.timing import PhaseTimes, phase_times
 
-SPLITS = ("train", "val", "test")
-
 
 @explained
 def prepare(cfg: DictConfig) -> None:
@@ -29,6 +27,5 @@ def prepare_data(cfg: DictConfig, times: PhaseTimes) -> Dataset:
 
 def prepare_stream(source: EventSource, data: Dataset, times: PhaseTimes) -> None:
     """The source's events of every recording."""
-    recordings = [recording for split in SPLITS for recording in data.recordings(split)]
     with times.measure(f"simulate {source.name}", resumed=True):
-        source.prepare(recordings)
+        source.prepare(data.all_recordings())

@@ -1,4 +1,4 @@
-"""Simulate the events of one clip into one file."""
+"""Simulate the events of one clip into one file, or those of a whole data set."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from eqs.data.simulated import write_stream
 from eqs.files import read_json, whole_numbers, write_json
 from eqs.frames import FrameFolder, VideoFile, image_paths
+from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.simulators import Simulator
 
@@ -23,18 +24,42 @@ TIMES = "timestamps.txt"
 
 @explained
 def simulate(cfg: DictConfig) -> None:
+    """Simulate a clip into `cfg.out`, or every recording of a data set where trainings look for it.
+
+    Raises:
+        FileNotFoundError: there are no frames.
+        ValueError: clip and data set are both given or both missing, the frames have no times, or
+            the simulator is none.
+    """
+    simulator = instantiate(cfg.sim)
+    if not isinstance(simulator, Simulator):
+        raise ValueError(f"Expected a simulator, got sim={simulator.name}; set sim=esim or another")
+    if (cfg.frames is None) == (cfg.data is None):
+        found = "neither" if cfg.data is None else "both"
+        raise ValueError(f"Expected a clip or a data set, got {found}; set frames or data")
+    if cfg.data is None:
+        simulate_clip(simulator, cfg)
+    else:
+        simulate_dataset(cfg)
+
+
+def simulate_dataset(cfg: DictConfig) -> None:
+    """Simulate the recordings that are missing or were made otherwise."""
+    recordings, source = dataset(cfg).all_recordings(), event_source(cfg.sim, cfg)
+    source.prepare(recordings)
+    folder = Path(cfg.paths.simulated) / cfg.data.name / source.label
+    log.info("%s: events of %d recordings", folder, len(recordings))
+
+
+def simulate_clip(simulator: Simulator, cfg: DictConfig) -> None:
     """Write `cfg.out`, a DSEC event file, from a folder of images or a video.
 
     Beside it lies `<out>.json`, which says how it was made; a file that was made the same way from
     the same frames is kept.
 
     Raises:
-        FileNotFoundError: there are no frames.
-        ValueError: the frames have no times, or the simulator is none.
+        ValueError: there are other events already.
     """
-    simulator = instantiate(cfg.sim)
-    if not isinstance(simulator, Simulator):
-        raise ValueError(f"Expected a simulator, got sim={simulator.name}; set sim=esim or another")
     out, source = Path(cfg.out), Path(cfg.frames)
     record = out.with_name(out.name + ".json")
     description = {

@@ -9,6 +9,7 @@ from hydra import compose, initialize_config_dir
 from PIL import Image
 
 from eqs.events import Events
+from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.simulate import simulate
 from eqs.simulators import V2E
 
@@ -107,3 +108,35 @@ def test_a_single_frame_is_no_clip(clip, tmp_path, caplog):
         run(folder, tmp_path / "events.h5", "frames_per_second=30")
     assert "at least two frames, got 1" in caplog.text
     assert list(tmp_path.glob("events*")) == []
+
+
+def test_a_data_set_is_simulated_where_trainings_look(tmp_path, make_recording, caplog):
+    for index, name in enumerate("ab"):
+        make_recording(tmp_path / "data" / name, seed=index)
+    root, stored = tmp_path / "data", tmp_path / "simulated"
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        options = [
+            "data=recordings",
+            f"data.root={root}",
+            f"paths.simulated={stored}",
+            "sim=pix2nvs",
+        ]
+        cfg = compose("simulate", options)
+    simulate(cfg)
+    recordings = dataset(cfg).all_recordings()
+    paths = [event_source(cfg.sim, cfg).path(recording) for recording in recordings]
+    assert [len(Events.load(path)) > 0 for path in paths] == [True, True]
+    before = [path.stat().st_mtime_ns for path in paths]
+    simulate(cfg)
+    assert [path.stat().st_mtime_ns for path in paths] == before
+
+
+@pytest.mark.parametrize(
+    ("overrides", "found"), [([], "neither"), (["frames=clip.mp4", "data=dsec_mini"], "both")]
+)
+def test_a_clip_or_a_data_set_is_wanted(caplog, overrides, found):
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("simulate", overrides)
+    with pytest.raises(SystemExit):
+        simulate(cfg)
+    assert f"Expected a clip or a data set, got {found}; set frames or data" in caplog.text
