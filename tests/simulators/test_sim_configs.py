@@ -44,6 +44,7 @@ READOUTS = {"bottleneck": Bottleneck, "row": RowReadout, "synchronous": Synchron
 PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
 
 CHANGED = (
+    *(f"{name}_dsec" for name in ("esim", "v2e", "prophesee", "icns", "improved_esim")),
     "esim_noisy",
     "v2e_paper",
     "v2e_clean",
