@@ -42,14 +42,15 @@ def with_room(keys: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
 
 
 @njit(cache=True, nogil=True)
-def _in_raster_order(keys: NDArray[np.int64]) -> bool:
+def _in_raster_order(keys: NDArray[np.int64]) -> int:
+    """How many keys from the first on were written row by row."""
     previous = -1
-    for key in keys:
-        pixel = (key >> 1) & _PIXEL_MASK
+    for index in range(keys.size):
+        pixel = (keys[index] >> 1) & _PIXEL_MASK
         if pixel < previous:
-            return False
+            return index
         previous = pixel
-    return True
+    return keys.size
 
 
 @njit(cache=True, nogil=True)
@@ -75,6 +76,23 @@ def _radix_sorted(keys: NDArray[np.int64], base: int, lowest_bit: int) -> NDArra
     return source
 
 
+@njit(cache=True, nogil=True)
+def _merged(first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Two sorted runs as one; of equal events those of the first run come first."""
+    both = np.empty(first.size + second.size, np.int64)
+    taken = 0
+    for index in range(both.size):
+        left = index - taken
+        if taken < second.size and (
+            left == first.size or (second[taken] >> 1) < (first[left] >> 1)
+        ):
+            both[index] = second[taken]
+            taken += 1
+        else:
+            both[index] = first[left]
+    return both
+
+
 def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
     """Sort the keys of one frame interval by (time, pixel); equal ones keep their order.
 
@@ -83,9 +101,15 @@ def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
             used as scratch.
         start_us: start of the interval on the stream's clock.
     """
-    # What was written row by row is already sorted by pixel, and only its times need sorting.
-    lowest_bit = TIME_SHIFT if _in_raster_order(keys) else 1
-    return _radix_sorted(keys, start_us << TIME_SHIFT, lowest_bit)
+    # What was written row by row is sorted by pixel already, and only its times need sorting. A
+    # model's noise comes as a second run of rows behind the signal's.
+    base = start_us << TIME_SHIFT
+    run = _in_raster_order(keys)
+    first, rest = _radix_sorted(keys[:run], base, TIME_SHIFT), keys[run:]
+    if not len(rest):
+        return first
+    lowest_bit = TIME_SHIFT if _in_raster_order(rest) == len(rest) else 1
+    return _merged(first, _radix_sorted(rest, base, lowest_bit))
 
 
 class ReorderBuffer:

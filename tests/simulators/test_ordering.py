@@ -32,13 +32,14 @@ def test_keys_survive_the_extremes():
     assert (events.y[1], events.x[1]) == (MAX_PIXELS // width - 1, width - 1)
 
 
-@pytest.mark.parametrize("raster", [True, False])
+# How many of 3000 events were written row by row before another run of rows begins.
+@pytest.mark.parametrize("runs", [(3000,), (2500,), (1, 2000), (), (500, 1000, 1500)])
 @pytest.mark.parametrize("span", [1, 200, 50_000, 20_000_000, MAX_TIME_US - 1000])
-def test_sorting_is_by_time_and_pixel_and_keeps_the_order_of_equals(raster, span):
+def test_sorting_is_by_time_and_pixel_and_keeps_the_order_of_equals(runs, span):
     generator = np.random.default_rng(0)
     times, pixels = generator.integers(1000, 1000 + span, 3000), generator.integers(0, 300, 3000)
-    if raster:
-        pixels = np.sort(pixels)
+    if runs:
+        pixels = np.concatenate([np.sort(part) for part in np.split(pixels, runs)])
     polarities = generator.integers(0, 2, 3000)
     found = ordered(keys_of(times, pixels, polarities), 1000)
     order = np.lexsort((np.arange(3000), pixels, times))
