@@ -7,6 +7,8 @@ ordinal is the order in which a pixel fired.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -159,16 +161,29 @@ def _unpack(
         p[index] = key & 1
 
 
-def events_of(keys: NDArray[np.int64], height: int, width: int, origin_us: int) -> Events:
+def events_of(
+    parts: Sequence[NDArray[np.int64]], height: int, width: int, origin_us: int
+) -> Events:
     """The events that sorted keys stand for, on a clock on which the stream began at `origin_us`.
 
+    Args:
+        parts: keys in order, in one array or in several that follow each other.
+        height: rows of the sensor.
+        width: its columns.
+        origin_us: time of the key's time zero.
+
     Example:
-        >>> events = events_of(np.array([event_key(7, 5, 1)]), height=2, width=4, origin_us=100)
+        >>> keys = np.array([event_key(7, 5, 1)])
+        >>> events = events_of([keys], height=2, width=4, origin_us=100)
         >>> [int(value[0]) for value in (events.t, events.x, events.y, events.p)]
         [107, 1, 1, 1]
     """
-    count = len(keys)
+    count = sum(map(len, parts))
     t, p = np.empty(count, np.int64), np.empty(count, np.uint8)
     x, y = np.empty(count, np.uint16), np.empty(count, np.uint16)
-    _unpack(keys, width, origin_us, t, x, y, p)
+    first = 0
+    for keys in parts:
+        own = slice(first, first + len(keys))
+        _unpack(keys, width, origin_us, t[own], x[own], y[own], p[own])
+        first = own.stop
     return Events(t, x, y, p, height, width)

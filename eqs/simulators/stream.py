@@ -87,8 +87,7 @@ class Stream:
                 for frame, time in zip(array, times, strict=True)
                 for each, at in self._with_those_between(frame, int(time))
             ]
-        nothing = self._events(np.empty(0, np.int64))
-        return Events.concatenate([nothing, *(part.result() for part in released)])
+        return self._events([part.result() for part in released])
 
     def _with_those_between(
         self, frame: NDArray[Any], time_us: int
@@ -118,11 +117,11 @@ class Stream:
             )
         self._finished = True
         keys = self._buffer.flush()
-        return self._events(keys if self._waiting is None else self._waiting.flush(keys))
+        return self._events([keys if self._waiting is None else self._waiting.flush(keys)])
 
-    def _events(self, keys: NDArray[np.int64]) -> Events:
+    def _events(self, parts: Sequence[NDArray[np.int64]]) -> Events:
         height, width = self._size
-        return events_of(keys, height, width, self._origin_us)
+        return events_of(parts, height, width, self._origin_us)
 
     def _check_continues(self, size: tuple[int, ...], times: NDArray[np.int64]) -> None:
         height, width = size
@@ -169,10 +168,10 @@ class Stream:
         bands = useful_bands(image.codes.size) if side_by_side else 1
         return begin(image) if bands == 1 else BandedPixels(begin, image, bands)
 
-    def _released(self, keys: NDArray[np.int64], interval: Interval) -> Events:
-        """The events that the end of an interval makes final."""
+    def _released(self, keys: NDArray[np.int64], interval: Interval) -> NDArray[np.int64]:
+        """Keys of the events that the end of an interval makes final."""
         keys = ordered(keys, interval.start_us)
         keys = self._buffer.push(keys, interval.stop_us)
         if self._waiting is not None:
             keys = self._waiting.push(keys, interval.stop_us)
-        return self._events(keys)
+        return keys

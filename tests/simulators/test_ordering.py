@@ -27,7 +27,7 @@ def keys_of(times, pixels, polarities):
 def test_keys_survive_the_extremes():
     width = 8192
     keys = keys_of([0, MAX_TIME_US - 1], [0, MAX_PIXELS - 1], [0, 1])
-    events = events_of(keys, MAX_PIXELS // width, width, origin_us=5)
+    events = events_of([keys], MAX_PIXELS // width, width, origin_us=5)
     assert events.t.tolist() == [5, MAX_TIME_US + 4]
     assert (events.y[1], events.x[1]) == (MAX_PIXELS // width - 1, width - 1)
 

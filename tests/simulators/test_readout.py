@@ -32,7 +32,7 @@ def leave(readout, arisen, size=(4, 4)):
 
 
 def table(keys, size):
-    events = events_of(keys, *size, origin_us=0)
+    events = events_of([keys], *size, origin_us=0)
     fields = (events.t, events.y, events.x, events.p)
     return list(zip(*(field.tolist() for field in fields), strict=True))
 
