@@ -125,7 +125,9 @@ class PIX2NVSPixels:
         first = log_luma(image.levels)[image.codes]
         self.reference = np.zeros_like(first) if self.update == _INTEGRATE else first
         self.threshold = np.full(first.size, float(model.threshold_log))
-        self.chosen = np.empty(first.size + 1, np.int32)
+        blocks = -(-image.height // model.block) * -(-image.width // model.block)
+        self.candidates = np.arange(blocks, dtype=np.uint32)  # a pixel is a block
+        self.chosen = np.empty(blocks + 1, np.uint32)
         self.keys = np.empty(first.size, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
@@ -134,14 +136,17 @@ class PIX2NVSPixels:
         fixed = model.mode == "fixed"
         smallest_log = model.threshold_min_log if fixed else 0.0
         signal, adaptation = log_luma(image.levels), float(model.adaptation)
+        if model.block > 1:
+            shape = (image.height, image.width, model.block)
+            _strongest_of_blocks(image.codes, signal, self.reference, shape, self.candidates)
         firing = _firing(
+            self.candidates,
             image.codes,
             signal,
             self.reference,
             self.threshold,
             smallest_log,
             adaptation,
-            (image.height, image.width, model.block),
             self.chosen,
         )
         self.keys, count = _fire(
@@ -184,38 +189,49 @@ def _strongest(
 
 
 @njit(cache=True, nogil=True)
+def _strongest_of_blocks(
+    codes: NDArray[Any],
+    signal: NDArray[np.float64],
+    reference: NDArray[np.float64],
+    shape: tuple[int, int, int],
+    candidates: NDArray[np.uint32],
+) -> None:
+    height, width, block = shape
+    count = 0
+    for top in range(0, height, block):
+        rows = (top, min(top + block, height))
+        for left in range(0, width, block):
+            columns = (left, min(left + block, width))
+            candidates[count] = _strongest(codes, signal, reference, rows, columns, width)
+            count += 1
+
+
+@njit(cache=True, nogil=True)
 def _firing(
+    candidates: NDArray[np.uint32],
     codes: NDArray[Any],
     signal: NDArray[np.float64],
     reference: NDArray[np.float64],
     threshold: NDArray[np.float64],
     smallest_log: float,
     adaptation: float,
-    shape: tuple[int, int, int],
-    chosen: NDArray[np.int32],
+    chosen: NDArray[np.uint32],
 ) -> int:
-    """Write the pixels that fire, the strongest of each block, to `chosen`; the others adapt."""
-    height, width, block = shape
+    """Write the candidates that fire to `chosen`; the others adapt."""
     count = 0
-    for top in range(0, height, block):
-        rows = (top, min(top + block, height))
-        for left in range(0, width, block):
-            pixel = top * width + left
-            if block > 1:
-                columns = (left, min(left + block, width))
-                pixel = _strongest(codes, signal, reference, rows, columns, width)
-            limit = threshold[pixel]
-            fires = abs(signal[codes[pixel]] - reference[pixel]) > limit
-            # Written in either case: a branch would cost more.
-            chosen[count] = pixel
-            count += fires
-            threshold[pixel] = limit if fires else max(limit * (1.0 - adaptation), smallest_log)
+    for pixel in candidates:
+        limit = threshold[pixel]
+        fires = abs(signal[codes[pixel]] - reference[pixel]) > limit
+        # Written in either case: a branch would cost more.
+        chosen[count] = pixel
+        count += fires
+        threshold[pixel] = limit if fires else max(limit * (1.0 - adaptation), smallest_log)
     return count
 
 
 @njit(cache=True, nogil=True)
 def _fire(
-    chosen: NDArray[np.int32],
+    chosen: NDArray[np.uint32],
     codes: NDArray[Any],
     signal: NDArray[np.float64],
     reference: NDArray[np.float64],
