@@ -39,6 +39,16 @@ def test_a_sequence_equals_its_steps_and_its_chunks(backbone):
 
 
 @torch.no_grad()
+def test_a_factor_on_all_counts_leaves_no_trace(backbone):
+    # The first convolution has no bias and a norm follows: what EQS is blind to by construction.
+    x = torch.poisson(torch.full((3, 1, 4, 32, 64), 2.0)) + 1.0
+    once, _ = backbone.forward_sequence(x)
+    thrice, _ = backbone.forward_sequence(3.0 * x)
+    for first, second in zip(once, thrice, strict=True):
+        close(first, second, rtol=1e-2, atol=2e-3)
+
+
+@torch.no_grad()
 @pytest.mark.parametrize("size", [(33, 50), (32, 64), (1, 1)])
 def test_padding_is_zeros_at_the_right_and_bottom(backbone, size):
     height, width = size
