@@ -14,6 +14,7 @@ from eqs.models.lstm import ConvLSTM, State, compute_dtype
 from eqs.models.states import States
 
 STRIDES = (4, 8, 16, 32)
+CACHED_VALUES = 1 << 21
 TAPS = (
     "conv",
     "downsample",
@@ -86,18 +87,27 @@ class Stage(nn.Module):
 
         Only the recurrence needs time in order: the rest sees T*N frames as one batch.
         """
-        convolved, normalised = self.downsample_cf2cl(x.flatten(0, 1))
-        window, attention = self.att_blocks[0](normalised, partition)
-        shape = (*x.shape[:2], *attention.shape[1:])
-        hidden, cell = self.lstm(attention.view(shape), state)
-        return Trace(
-            convolved.view(shape),
-            normalised.view(shape),
-            window.view(shape),
-            attention.view(shape),
-            hidden,
-            cell,
+        parts = [self._feed_forward(part, partition) for part in self._portions(x.flatten(0, 1))]
+        maps = parts[0] if len(parts) == 1 else map(torch.cat, zip(*parts, strict=True))
+        convolved, normalised, window, attention = (
+            each.view(*x.shape[:2], *each.shape[1:]) for each in maps
         )
+        hidden, cell = self.lstm(attention, state)
+        return Trace(convolved, normalised, window, attention, hidden, cell)
+
+    def _feed_forward(
+        self, x: Tensor, partition: tuple[int, int]
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        convolved, normalised = self.downsample_cf2cl(x)
+        return convolved, normalised, *self.att_blocks[0](normalised, partition)
+
+    def _portions(self, x: Tensor) -> Sequence[Tensor]:
+        """Frames (B, C, H, W) in portions whose maps a processor's cache holds between layers."""
+        if x.device.type != "cpu":
+            return (x,)
+        conv = self.downsample_cf2cl.conv
+        values = x.shape[0] * conv.out_channels * x.shape[2] * x.shape[3] // conv.stride[0] ** 2
+        return x.chunk(max(1, -(-values // CACHED_VALUES)))
 
     def tap(self, name: str, trace: Trace, state: State | None) -> Tensor:
         """One named quantity of a run, (T, N, h, w, C)."""

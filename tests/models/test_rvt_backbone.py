@@ -38,6 +38,21 @@ def test_a_sequence_equals_its_steps_and_its_chunks(backbone):
             close(other[stage][1], final[stage][1])
 
 
+def test_portions_of_frames_give_the_same_maps_and_gradients(backbone, monkeypatch):
+    x = torch.randn(5, 2, 4, 32, 64)
+    results = []
+    for cached in (1 << 21, 1 << 10, 1):
+        monkeypatch.setattr("eqs.models.backbone.CACHED_VALUES", cached)
+        features, _ = backbone.forward_sequence(x)
+        taps, _ = backbone.taps(x, None, (1, 4), ("conv", "window", "gate"))
+        maps = [*features, *(each for stages in taps.values() for each in stages)]
+        loss = sum(each.square().sum() for each in features)
+        results.append((*maps, *torch.autograd.grad(loss, list(backbone.parameters()))))
+    for other in results[1:]:
+        for first, second in zip(results[0], other, strict=True):
+            close(first, second, rtol=1e-4, atol=1e-4)
+
+
 @torch.no_grad()
 def test_a_factor_on_all_counts_leaves_no_trace(backbone):
     # The first convolution has no bias and a norm follows: what EQS is blind to by construction.
