@@ -36,7 +36,7 @@ def cached_histogram(
         ...     path = Path(folder) / "50000.h5"
         ...     _ = cached_histogram(path, lambda: counts, (2, 2, 2))
         ...     bool((cached_histogram(path, lambda: counts + 1, (2, 2, 2)) == counts).all())
-    True
+        True
     """
     if path.exists():
         return _read(path, shape)
