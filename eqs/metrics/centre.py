@@ -34,6 +34,10 @@ class Centre:
         covariances: covariance of each stage, float32, shape (channels, channels), which only
             whitened features need; none in a centre of means alone.
         patches: patch vectors averaged, over all stages.
+        features_hash: `Definition.features_hash` of the features; empty where nobody noted it.
+
+    Raises:
+        ValueError: there is not one mean, and one covariance or none, for each stage.
     """
 
     tap: str
@@ -41,6 +45,16 @@ class Centre:
     means: tuple[NDArray[np.float32], ...]
     covariances: tuple[NDArray[np.float32], ...] = ()
     patches: int = 0
+    features_hash: str = ""
+
+    def __post_init__(self) -> None:
+        """Check that every stage has its statistics."""
+        counts = len(self.stages), len(self.means), len(self.covariances)
+        if counts[0] != counts[1] or counts[2] not in (0, counts[0]):
+            raise ValueError(
+                f"Expected a mean and a covariance, or no covariances, for {counts[0]} stages, "
+                f"got {counts[1]} and {counts[2]}"
+            )
 
     @property
     def sha256(self) -> str:
@@ -57,9 +71,10 @@ class Centre:
         arrays: dict[str, Any] = {}
         for name, statistics in (("stage", self.means), ("covariance", self.covariances)):
             arrays |= {f"{name}_{k}": a for k, a in zip(self.stages, statistics, strict=False)}
+        arrays |= {"tap": self.tap, "patches": self.patches, "features_hash": self.features_hash}
         target.parent.mkdir(parents=True, exist_ok=True)
         with partial.open("wb") as file:
-            np.savez(file, tap=self.tap, patches=self.patches, sha256=self.sha256, **arrays)
+            np.savez(file, sha256=self.sha256, **arrays)
         partial.replace(target)
 
     @classmethod
@@ -80,12 +95,20 @@ class Centre:
                 spreads = (f"covariance_{stage}" for stage in stages)
                 covariances = tuple(data[name] for name in spreads if name in data)
                 tap, patches, stored = str(data["tap"]), int(data["patches"]), str(data["sha256"])
+                noted = str(data["features_hash"]) if "features_hash" in data else ""
         except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
             raise ValueError(
                 f"Expected a centre written by this package at {source}, got {error}; "
                 "delete it to have it computed again"
             ) from error
-        centre = cls(tap=tap, stages=stages, means=means, covariances=covariances, patches=patches)
+        centre = cls(
+            tap=tap,
+            stages=stages,
+            means=means,
+            covariances=covariances,
+            patches=patches,
+            features_hash=noted,
+        )
         if centre.sha256 != stored:
             raise ValueError(
                 f"Expected the centre at {source} to match its hash, got other values; "
@@ -163,6 +186,7 @@ def feature_centres(
             means=tuple(running.mean() for running in by_stage),
             covariances=tuple(running.covariance() for running in by_stage),
             patches=sum(running.count for running in by_stage),
+            features_hash=definition.features_hash,
         )
         for tap, by_stage in sums.items()
     }

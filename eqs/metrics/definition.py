@@ -11,6 +11,8 @@ from typing import Literal
 import torch
 from torch import nn
 
+from eqs.files import short_hash
+
 TAPS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 
 KINDS = {
@@ -22,6 +24,11 @@ KINDS = {
     "span": ("window", "events"),
     "counts": ("raw", "normalised"),
 }
+
+FEATURE_CHOICES = (
+    "patch", "patch_size", "pooling", "state",
+    "bins", "window_us", "count_cutoff", "span", "counts",
+)  # fmt: skip
 
 # Choices that have one reading here. They are part of the hash, so that a later alternative
 # cannot be mistaken for this one.
@@ -122,6 +129,12 @@ class Definition:
         """First 12 hex digits of the sha256 of all choices as canonical JSON."""
         choices = json.dumps({**asdict(self), **FIXED_RULES}, sort_keys=True)
         return hashlib.sha256(choices.encode()).hexdigest()[:12]
+
+    @property
+    def features_hash(self) -> str:
+        """Eight hex digits of what pooled features depend on beside the network and its tap."""
+        choices = asdict(self)
+        return short_hash({name: choices[name] for name in FEATURE_CHOICES})
 
     @property
     def column(self) -> str:

@@ -62,8 +62,8 @@ class Reading:
         centre: mean real feature; needed where the features are not raw.
 
     Raises:
-        ValueError: the centre is missing, not asked for, of another tap, or without the covariances
-            that whiten.
+        ValueError: the centre is missing, not asked for, of another tap or of features made
+            otherwise, or without the covariances that whiten.
     """
 
     definition: Definition
@@ -81,6 +81,14 @@ class Reading:
             raise ValueError(
                 f"Expected a centre of tap {self.definition.tap}, got one of {self.centre.tap}; "
                 "set eqs.centre or eqs.tap"
+            )
+        if self.centre is not None and self.centre.features_hash not in (
+            "",
+            self.definition.features_hash,
+        ):
+            raise ValueError(
+                "Expected a centre of features pooled and binned as these are, got one of others; "
+                "set eqs.centre, or the keys from eqs.patch to eqs.state as when it was computed"
             )
         whitened = self.definition.features == "whitened"
         if whitened and self.centre is not None and not self.centre.covariances:

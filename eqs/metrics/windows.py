@@ -185,12 +185,14 @@ def histogram_chunks(
 def normalised_counts(histograms: Tensor, definition: Definition) -> Tensor:
     """Histograms scaled so that each window of each stream has the same mean count.
 
+    For backbones that see the scale of their input. RVT does not: its first convolution has no bias
+    and a norm follows.
+
     Convention: the mean is that of `EVENTS_PER_PIXEL_AND_SECOND`, one number for all streams and
     not one between the two that are compared. So a window does not depend on what it is compared
     with: the score is symmetric, the real stream needs one pass for all candidates, and the mean
-    real feature is computed at the same scale. Counts saturate at the cutoff as before, so that
-    the only events of a window do not become a flash that no detector was trained on. A window
-    without events stays as it is.
+    real feature is computed at the same scale. Counts saturate at the cutoff as before, which
+    leaves very sparse windows below the mean. A window without events stays as it is.
 
     Args:
         histograms: counts, float, shape (..., 2 * bins, height, width).

@@ -200,8 +200,8 @@ def _readings(
 
 
 def _centre_path(folder: Path, tap: str, definition: Definition) -> Path:
-    """One file per tap and binning, centred or whitened: the statistics depend on no more."""
-    centred = replace(definition, tap=tap, features="centred")
+    """One file per tap and binning: the statistics depend on neither features nor mask."""
+    centred = replace(definition, tap=tap, features="centred", mask="none")
     return folder / f"centre-{centred.hash}.npz"
 
 

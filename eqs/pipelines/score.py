@@ -140,7 +140,7 @@ def score_recording(
 def untrained_scores(
     judge: Judge, real: EventReader, candidates: Sequence[EventReader], start_us: int, stop_us: int
 ) -> list[float]:
-    """The headline with the untrained network, centred on this recording's own real features."""
+    """The headline with the untrained network, whose centre is this recording's own."""
     definition = judge.headline.definition
     if definition.features == "raw":
         definition = replace(definition, features="centred")

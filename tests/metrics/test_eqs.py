@@ -388,6 +388,23 @@ def test_centre_belongs_to_its_tap(centres):
         Reading(definition=replace(BASE, tap="gate", features="centred"), centre=centres["hidden"])
 
 
+@pytest.mark.parametrize("change", [{"patch_size": 2}, {"state": "reset"}, {"count_cutoff": 3}])
+def test_a_centre_belongs_to_features_made_alike(centres, tmp_path, change):
+    centres["hidden"].save(tmp_path / "centre.npz")
+    loaded = Centre.load(tmp_path / "centre.npz")
+    whole = replace(BASE, features="centred")
+    for fits in (whole, replace(whole, stages=(1, 2), mask="active", warmup_windows=0)):
+        assert Reading(definition=fits, centre=loaded).centre is loaded
+    with pytest.raises(ValueError, match=r"pooled and binned as these are, got one of others"):
+        Reading(definition=replace(whole, **change), centre=loaded)
+
+
+def test_a_centre_has_statistics_for_every_stage(centres):
+    whole = centres["hidden"]
+    with pytest.raises(ValueError, match=r"no covariances, for 3 stages, got 3 and 2"):
+        replace(whole, covariances=whole.covariances[:2])
+
+
 def test_whitened_features_need_covariances(centres, tmp_path):
     whole = centres["hidden"]
     alone = Centre(tap="hidden", stages=(1, 2, 3), means=whole.means)
