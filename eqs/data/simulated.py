@@ -20,6 +20,7 @@ from eqs.data.recording import Recording
 from eqs.events.writer import EventWriter
 from eqs.files import file_sha256, read_json, short_hash, write_json
 from eqs.frames import FrameFolder
+from eqs.processors import share_cores
 from eqs.simulators import Simulator
 
 log = logging.getLogger(__name__)
@@ -106,7 +107,10 @@ class SimulatedEvents:
                 "set data.root to recordings with frames, or sim=real"
             )
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(min(self.workers, len(missing)), mp_context=context) as pool:
+        workers = min(self.workers, len(missing))
+        with ProcessPoolExecutor(
+            workers, mp_context=context, initializer=share_cores, initargs=(workers,)
+        ) as pool:
             jobs = [pool.submit(self.simulate, recording) for recording in missing]
             description = f"simulating {self.simulator.name}"
             for job in track(as_completed(jobs), description=description, total=len(jobs)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.processors import available_cores
 
 if TYPE_CHECKING:
     from eqs.simulators.stream import Interval, Pixels
@@ -21,8 +21,7 @@ LEAST_PIXELS = 1 << 15
 
 def useful_bands(pixels: int) -> int:
     """How many bands of a sensor this machine's cores finish soonest."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return max(1, min(cores or 1, pixels // LEAST_PIXELS))
+    return max(1, min(available_cores(), pixels // LEAST_PIXELS))
 
 
 class BandedPixels:

@@ -44,7 +44,8 @@ class Simulator(ABC):
     """Whether 8-bit colour becomes 8-bit grey, or grey with fractions."""
     in_bands: ClassVar[bool] = False
     """Whether parts of a sensor are simulated side by side in `fixed` mode. It takes pixels that go
-    by their own light alone, and pays where they compute more than they read."""
+    by their own light alone and draw with `first_pixel=image.first_pixel`, and pays where they
+    compute more than they read."""
 
     mode: str = "fixed"
     interpolation: Interpolation | None = None

@@ -59,7 +59,7 @@ def test_where_files_lie_does_not_change_the_recipe() -> None:
 
 
 def test_readers_help_a_gpu_and_leave_a_cpu_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.cpu_count", lambda: 3)
+    monkeypatch.setattr("eqs.pipelines.resolvers.available_cores", lambda: 3)
     for there, readers in ((False, 0), (True, 3)):
         monkeypatch.setattr("torch.cuda.is_available", lambda there=there: there)
         assert composed().datamodule.num_workers == readers

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from eqs.events import Events
+from eqs.frames import LinearInterpolation
 from eqs.simulators import (
     CARLA,
     ESIM,
@@ -22,6 +23,7 @@ from eqs.simulators import (
     ImprovedESIM,
     Prophesee,
     Recorded,
+    RowReadout,
     Vid2E,
 )
 from eqs.simulators.bands import useful_bands
@@ -49,6 +51,7 @@ SIMULATORS = [
     ICNS(mode="faithful", time_constant_us=3000.0, background_on_hz=3, threshold_sigma_log=0.1),
     ImprovedESIM(),
     ImprovedESIM(white_current_fa=20.0, leak_hz=3, threshold_sigma_log=0.03, refractory_us=900),
+    ImprovedESIM(order=0, refractory_us=900, threshold_on_log=0.1),
     ImprovedESIM(mode="faithful", threshold_on_log=0.1, refractory_us=9000, order=2),
     Vid2E(),
 ]
@@ -118,8 +121,24 @@ def test_bands_of_any_height_give_the_same_events(simulator, dtype, walk, monkey
         assert_same(whole, chunked(simulator, frames, times, [4, 5]))
 
 
+@pytest.mark.parametrize("simulator", [s for s in SIMULATORS if s.in_bands], ids=label)
+def test_bands_know_of_frames_between_readouts_and_pickles(simulator, walk, monkeypatch):
+    frames, times = walk
+    simulator = replace(
+        simulator, interpolation=LinearInterpolation(factor=2), readout=RowReadout()
+    )
+    whole = simulator.simulate(frames, times)
+    monkeypatch.setattr("eqs.simulators.stream.useful_bands", lambda _: 99)  # more than rows
+    stream = simulator.start()
+    first = stream.step(frames[:9], times[:9])
+    stream = pickle.loads(pickle.dumps(stream))
+    assert_same(
+        whole, Events.concatenate([first, stream.step(frames[9:], times[9:]), stream.finish()])
+    )
+
+
 def test_small_sensors_are_left_whole_and_large_ones_use_the_cores(monkeypatch):
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(6), raising=False)
+    monkeypatch.setattr("eqs.simulators.bands.available_cores", lambda: 6)
     assert [useful_bands(h * w) for h, w in ((96, 128), (260, 346), (480, 640))] == [1, 2, 6]
 
 

@@ -1,0 +1,19 @@
+"""The processor cores that this process may count on."""
+
+from __future__ import annotations
+
+import os
+
+_share = 1
+
+
+def share_cores(processes: int) -> None:
+    """Say that so many processes work side by side: each counts on its part of the cores."""
+    global _share
+    _share = processes
+
+
+def available_cores() -> int:
+    """Cores this process may use and does not share, at least one."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, (usable or 1) // _share)
