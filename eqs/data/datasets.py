@@ -21,7 +21,7 @@ from eqs.data.sampling import Chunk, Schedule, keyed_generator
 from eqs.data.windows import detection_windows
 from eqs.events import EventReader
 from eqs.files import short_hash
-from eqs.representations import stacked_histogram
+from eqs.representations import HISTOGRAM_VERSION, stacked_histogram
 
 Batch = dict[str, Tensor]
 LabelledBoxes = tuple[NDArray[np.float32], NDArray[np.int64]]
@@ -101,7 +101,7 @@ class WindowSource:
             return None
         file = self.events_path.stat()
         events = [str(self.events_path.resolve()), file.st_size, file.st_mtime_ns]
-        key = short_hash([events, asdict(self.binning), self.shape])
+        key = short_hash([HISTOGRAM_VERSION, events, asdict(self.binning), self.shape])
         return self.cache / f"{self.recording.name}-{key}"
 
     def _binned(self, index: int) -> NDArray[np.uint8]:

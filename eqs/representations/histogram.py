@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from eqs.events import Events
 from eqs.representations.window import Span, events_inside
 
+HISTOGRAM_VERSION = 1
+"""Raised whenever equal events begin to give other counts; stored histograms are named by it."""
+
 
 def stacked_histogram(
     events: Events,
