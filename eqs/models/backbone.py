@@ -14,7 +14,7 @@ from eqs.models.lstm import ConvLSTM, State, compute_dtype
 from eqs.models.states import States
 
 STRIDES = (4, 8, 16, 32)
-CACHED_VALUES = 1 << 21
+CACHED_VALUES = 1 << 21  # of a stage's map, 8 MB in float32
 TAPS = (
     "conv",
     "downsample",

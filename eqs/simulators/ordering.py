@@ -44,7 +44,7 @@ def with_room(keys: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
 
 
 @njit(cache=True, nogil=True)
-def _in_raster_order(keys: NDArray[np.int64]) -> int:
+def _raster_run(keys: NDArray[np.int64]) -> int:
     """How many keys from the first on were written row by row."""
     previous = -1
     for index in range(keys.size):
@@ -106,11 +106,11 @@ def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
     # What was written row by row is sorted by pixel already, and only its times need sorting. A
     # model's noise comes as a second run of rows behind the signal's.
     base = start_us << TIME_SHIFT
-    run = _in_raster_order(keys)
+    run = _raster_run(keys)
     first, rest = _radix_sorted(keys[:run], base, TIME_SHIFT), keys[run:]
     if not len(rest):
         return first
-    lowest_bit = TIME_SHIFT if _in_raster_order(rest) == len(rest) else 1
+    lowest_bit = TIME_SHIFT if _raster_run(rest) == len(rest) else 1
     return _merged(first, _radix_sorted(rest, base, lowest_bit))
 
 

@@ -127,7 +127,7 @@ class PIX2NVSPixels:
         self.threshold = np.full(first.size, float(model.threshold_log))
         blocks = -(-image.height // model.block) * -(-image.width // model.block)
         self.candidates = np.arange(blocks, dtype=np.uint32)  # a pixel is a block
-        self.chosen = np.empty(blocks + 1, np.uint32)
+        self.chosen = np.empty(blocks, np.uint32)
         self.keys = np.empty(first.size, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:

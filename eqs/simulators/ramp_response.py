@@ -118,7 +118,7 @@ def _root(
             low_us = wait_us
         speed = slope - decayed / tau_us
         step_us = missing / speed if speed != 0.0 else math.inf
+        wait_us += step_us
         if abs(step_us) <= _ACCURACY_US or high_us - low_us <= _ACCURACY_US:
             break
-        wait_us += step_us
-    return wait_us
+    return min(max(wait_us, low_us), high_us)

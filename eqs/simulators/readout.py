@@ -187,7 +187,11 @@ class SynchronousReadout(Readout):
 
 
 class WaitingEvents:
-    """The events that have arisen in a sensor and not left it yet."""
+    """The events that have arisen in a sensor and not left it yet.
+
+    They are all held in memory and looked through at each frame: a readout that is too slow for its
+    scene costs more with every frame.
+    """
 
     def __init__(self, readout: Readout, size: tuple[int, int]) -> None:
         """Start with nothing waiting."""

@@ -95,8 +95,9 @@ def test_crossings_are_the_roots_of_the_response():
             lambda wait, arguments, bound: response(*arguments, wait) - bound,
             *np.linspace(0, 5e4, 4001)[[first - 1, first]],
             args=(arguments, bounds[up]),
+            xtol=1e-9,
         )
-        assert wait_us == pytest.approx(expected, abs=1e-3)
+        assert wait_us == pytest.approx(expected, abs=1e-5)
         found += 1
     assert found > 500
 
