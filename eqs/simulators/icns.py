@@ -16,6 +16,7 @@ from eqs.frames import GreyImage
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.icns_faithful import FaithfulICNSPixels
 from eqs.simulators.icns_pixels import ICNSPixels
+from eqs.simulators.noise import rate_map
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +49,8 @@ class ICNS(Simulator):
         time_constant_us: of the photoreceptor at 1000 lux.
         background_on_hz: background ON events per second of a pixel.
         background_off_hz: the same for OFF.
+        background_spread_decades: standard deviation of the decimal logarithm of both between
+            pixels, which leaves their means.
         white_lux: illuminance of grey level 255.
         seed: of thresholds, latencies and background.
 
@@ -76,6 +79,7 @@ class ICNS(Simulator):
     time_constant_us: float = 40.0
     background_on_hz: float = 0.1
     background_off_hz: float = 0.01
+    background_spread_decades: float = 0.0
     white_lux: float = 1e4
     seed: int = 0
 
@@ -93,6 +97,7 @@ class ICNS(Simulator):
             "refractory_us",
             "background_on_hz",
             "background_off_hz",
+            "background_spread_decades",
         )
 
     @property
@@ -104,6 +109,14 @@ class ICNS(Simulator):
     def signal(self, levels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Natural log of the illuminance plus one lux, at grey levels 0..255."""
         return np.log1p(levels * self.white_lux / 255.0)
+
+    def background_hz(self, image: GreyImage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Background ON and OFF events per second of every pixel."""
+        spread, seed = self.background_spread_decades, self.seed
+        return (
+            rate_map(self.background_on_hz, spread, seed, "background on", image),
+            rate_map(self.background_off_hz, spread, seed, "background off", image),
+        )
 
     def begin(self, image: GreyImage, sequence: str) -> ICNSPixels | FaithfulICNSPixels:
         """The pixels after the first frame."""

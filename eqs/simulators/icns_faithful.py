@@ -36,8 +36,9 @@ class FaithfulICNSPixels:
         self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
         self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
         self.blind_us = np.full(self.voltage.size, SEEING)
-        self.on_us, self.on_period_us = self._background(model.background_on_hz, "on")
-        self.off_us, self.off_period_us = self._background(model.background_off_hz, "off")
+        on_hz, off_hz = model.background_hz(image)
+        self.on_us, self.on_period_us = self._background(on_hz, "on")
+        self.off_us, self.off_period_us = self._background(off_hz, "off")
         self.keys = np.empty(self.voltage.size, np.int64)
 
     def _thresholds(self, mean_log: float, name: str, image: GreyImage) -> NDArray[np.float64]:
@@ -47,13 +48,16 @@ class FaithfulICNSPixels:
     def _time_constants(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.model.time_constant_us * 1000.0 * np.exp(-signal)
 
-    def _background(self, rate_hz: float, name: str) -> tuple[NDArray[np.float64], float]:
-        """Times of the first background events, anywhere in a period, and the period."""
-        if rate_hz == 0:
-            return np.full(self.voltage.size, np.inf), math.inf
-        period_us = 1.0 / (MICROSECONDS * rate_hz)
+    def _background(
+        self, rates_hz: NDArray[np.float64], name: str
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times of the first background events, anywhere in a period, and the periods."""
+        if not rates_hz.any():
+            silence = np.full(rates_hz.size, np.inf)
+            return silence, silence
+        periods_us = 1.0 / (MICROSECONDS * rates_hz)
         key = draw_key(self.model.seed, "background phase", self.sequence, name)
-        return period_us * uniform_map(key, self.voltage.size), period_us
+        return periods_us * uniform_map(key, rates_hz.size), periods_us
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
@@ -118,7 +122,7 @@ def _fire(
     drawn: tuple[float, float, float],
     delays: tuple[float, float, float],
     background_us: tuple[NDArray[np.float64], NDArray[np.float64]],
-    periods_us: tuple[float, float],
+    periods_us: tuple[NDArray[np.float64], NDArray[np.float64]],
     frame_key: np.uint64,
     start_us: float,
     stop_us: float,
@@ -143,7 +147,7 @@ def _fire(
                 keys[count] = event_key(int(now_us), pixel, 1 - off_side)
                 count += 1
                 level = reset[pixel] = target
-                background_us[off_side][pixel] += periods_us[off_side]
+                background_us[off_side][pixel] += periods_us[off_side][pixel]
         while blind_us[pixel] == SEEING and level != target:
             change = _follow(level, target, (stop_us - now_us) / tau) - reset[pixel]
             if target == 0.0:

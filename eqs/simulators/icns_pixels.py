@@ -35,6 +35,7 @@ class ICNSPixels:
         self.reset = self.voltage.copy()
         self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
         self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
+        self.background = model.background_hz(image)
         self.blind_us = np.full(self.voltage.size, SEEING)
         self.keys = np.empty(self.voltage.size, np.int64)
 
@@ -46,7 +47,6 @@ class ICNSPixels:
         """Events of one interval."""
         model = self.model
         signal = model.signal(image.levels)
-        background = (model.background_on_hz, model.background_off_hz)
         self.keys, count = _fire(
             (self.codes, self.signal, np.exp(-0.5 * self.signal)),
             (image.codes, signal, np.exp(-0.5 * signal)),
@@ -55,7 +55,7 @@ class ICNSPixels:
             (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
             (float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
             float(model.time_constant_us),
-            (background[0] * MICROSECONDS, background[1] * MICROSECONDS),
+            self.background,
             draw_key(
                 model.seed,
                 "events",
@@ -89,7 +89,7 @@ def _fire(
     drawn: tuple[float, float, float],
     delays: tuple[float, float, float],
     time_constant_us: float,
-    background_per_us: tuple[float, float],
+    background_hz: tuple[NDArray[np.float64], NDArray[np.float64]],
     frame_key: np.uint64,
     start_us: float,
     stop_us: float,
@@ -97,7 +97,6 @@ def _fire(
 ) -> Fired:
     voltage, reset, blind_us = state
     on, off = thresholds
-    rate = background_per_us[0] + background_per_us[1]
     count = 0
     for pixel in range(voltage.size):
         codes = start[0][pixel], end[0][pixel]
@@ -105,6 +104,8 @@ def _fire(
         slope = (last - first) / (stop_us - start_us)
         tau_us = time_constant_us * 1000.0 * start[2][codes[0]] * end[2][codes[1]]
         level, now_us = voltage[pixel], start_us
+        on_rate = background_hz[0][pixel] * MICROSECONDS
+        rate = on_rate + background_hz[1][pixel] * MICROSECONDS
         pixel_key, ordinal = word_at(frame_key, pixel), 0
         while True:
             light = first + slope * (now_us - start_us)
@@ -132,7 +133,7 @@ def _fire(
                 level = response(level, light, slope, tau_us, wait_us)
                 now_us += wait_us
                 event_us = now_us
-                up = uniform(word_at(word, 1)) * rate < background_per_us[0]
+                up = uniform(word_at(word, 1)) * rate < on_rate
             else:
                 break
             keys = with_room(keys, count + 1)

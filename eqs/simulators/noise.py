@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from eqs.frames import GreyImage
 from eqs.simulators.ordering import Fired, event_key, with_room
 from eqs.simulators.photoreceptor import MICROSECONDS, relative_light
-from eqs.simulators.randomness import poisson, uniform, word_at
+from eqs.simulators.randomness import draw_key, normal_map, poisson, uniform, word_at
 
 
 def shot_events(
@@ -24,6 +26,28 @@ def shot_events(
     """
     full = 0.5 * shot_noise_hz * span_us * MICROSECONDS
     return full * (1.0 - 0.75 * relative_light(levels))
+
+
+def rate_map(
+    rate_hz: float, spread_decades: float, seed: int, name: str, image: GreyImage
+) -> NDArray[np.float64]:
+    """A rate for every pixel of an image, log-normally distributed about a given mean.
+
+    Measured background is of this kind: most pixels are nearly silent, and a few make most of it.
+    Without spread the map takes no memory, being one number seen many times.
+
+    Example:
+        >>> image = GreyImage.from_frame(np.zeros((1, 3)))
+        >>> rate_map(0.1, 0.0, seed=0, name="on", image=image).tolist()
+        [0.1, 0.1, 0.1]
+    """
+    pixels = image.codes.size
+    if rate_hz == 0 or spread_decades == 0:
+        return np.broadcast_to(np.float64(rate_hz), (pixels,))
+    spread = math.log(10.0) * spread_decades
+    drawn = normal_map(draw_key(seed, name, first_pixel=image.first_pixel), pixels)
+    rates: NDArray[np.float64] = rate_hz * np.exp(spread * drawn - 0.5 * spread * spread)
+    return rates
 
 
 @njit(cache=True, nogil=True)

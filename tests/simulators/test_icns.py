@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 from simulator_checks import assert_poisson, still
 
+from eqs.frames import GreyImage
 from eqs.simulators import ICNS
 from eqs.simulators.ramp_response import first_crossing, response
 
@@ -126,6 +127,20 @@ def test_the_background_has_its_nominal_rates(mode):
     rest = events.t[events.p == 1] % 500_000
     pairs = set(zip(pixels_of(events)[events.p == 1].tolist(), rest.tolist(), strict=True))
     assert (len(pairs) < 1.1 * 576) == (mode == "faithful")
+
+
+@pytest.mark.parametrize("mode", ["fixed", "faithful"])
+def test_a_spread_background_keeps_its_mean_and_differs_between_pixels(mode):
+    noisy = CLEAN | {"background_on_hz": 3.0, "background_spread_decades": 0.4}
+    model = ICNS(**noisy, mode=mode)
+    events = model.simulate(still(120, 501, 40), np.arange(501) * 20_000)
+    seconds = 10.0
+    rates = model.background_hz(GreyImage.from_frame(still(120, 1, 40)[0]))[0]
+    assert rates.mean() == pytest.approx(3.0, rel=0.15)
+    assert np.log10(rates).std() == pytest.approx(0.4, rel=0.1)
+    counts = np.bincount(pixels_of(events), minlength=1600)
+    assert counts.sum() == pytest.approx(rates.sum() * seconds, rel=0.03)
+    assert np.corrcoef(counts, rates)[0, 1] > 0.95
 
 
 def pixels_of(events):

@@ -48,6 +48,7 @@ SIMULATORS = [
     DVSVoltmeter(),
     DVSVoltmeter(mode="faithful", photon_noise_per_sqrt_us=0.05, light_leak_per_us=1e-7, seed=5),
     ICNS(time_constant_us=3000.0, background_on_hz=3, background_off_hz=2, jitter_us=500, seed=5),
+    ICNS(time_constant_us=3000.0, background_on_hz=3, background_spread_decades=0.5, seed=6),
     ICNS(mode="faithful", time_constant_us=3000.0, background_on_hz=3, threshold_sigma_log=0.1),
     ImprovedESIM(),
     ImprovedESIM(white_current_fa=20.0, leak_hz=3, threshold_sigma_log=0.03, refractory_us=900),
