@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from eqs.simulators.icns import ICNS
 
 
+Seen = tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]
+"""Codes of an image, its signal for each code, and the inverse root of the light for each."""
+
+
 class ICNSPixels:
     """Voltages, resets and thresholds of all pixels."""
 
@@ -29,9 +33,8 @@ class ICNSPixels:
         """Settle on the first image."""
         self.model = model
         self.sequence = sequence
-        self.codes = image.codes
-        self.signal = model.signal(image.levels)
-        self.voltage = self.signal[image.codes]
+        self.seen = self._seen(image)
+        self.voltage = self.seen[1][image.codes]
         self.reset = self.voltage.copy()
         self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
         self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
@@ -43,13 +46,17 @@ class ICNSPixels:
         sigma, seed = self.model.threshold_sigma_log, self.model.seed
         return threshold_map(mean_log, sigma, seed, name, image).copy()
 
+    def _seen(self, image: GreyImage) -> Seen:
+        signal = self.model.signal(image.levels)
+        return image.codes, signal, np.exp(-0.5 * signal)
+
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
         model = self.model
-        signal = model.signal(image.levels)
+        before, self.seen = self.seen, self._seen(image)
         self.keys, count = _fire(
-            (self.codes, self.signal, np.exp(-0.5 * self.signal)),
-            (image.codes, signal, np.exp(-0.5 * signal)),
+            before,
+            self.seen,
             (self.voltage, self.reset, self.blind_us),
             (self.on, self.off),
             (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
@@ -67,7 +74,6 @@ class ICNSPixels:
             float(interval.stop_us),
             self.keys,
         )
-        self.codes, self.signal = image.codes, signal
         return self.keys[:count]
 
 
@@ -82,8 +88,8 @@ def _background_wait(word: np.uint64, rate_per_us: float, left_us: float) -> flo
 
 @njit(cache=True, nogil=True)
 def _fire(
-    start: tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]],
-    end: tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]],
+    start: Seen,
+    end: Seen,
     state: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     thresholds: tuple[NDArray[np.float64], NDArray[np.float64]],
     drawn: tuple[float, float, float],
