@@ -15,5 +15,6 @@ def share_cores(processes: int) -> None:
 
 def available_cores() -> int:
     """Cores this process may use and does not share, at least one."""
+    # A container may grant fewer than there are.
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, (usable or 1) // _share)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 import logging
 import multiprocessing
-import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,7 +19,7 @@ from eqs.data.recording import Recording
 from eqs.events.writer import EventWriter
 from eqs.files import file_sha256, read_json, short_hash, write_json
 from eqs.frames import FrameFolder
-from eqs.processors import share_cores
+from eqs.processors import available_cores, share_cores
 from eqs.simulators import Simulator
 
 log = logging.getLogger(__name__)
@@ -74,7 +73,7 @@ class SimulatedEvents:
 
     simulator: Simulator
     root: Path
-    workers: int = os.cpu_count() or 1
+    workers: int = field(default_factory=available_cores)
 
     @property
     def name(self) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import shutil
 import time
 from pathlib import Path
@@ -24,6 +23,7 @@ from eqs.pipelines.command import explained
 from eqs.pipelines.prepare import prepare_data, prepare_stream
 from eqs.pipelines.runs import Run, recipe_hash
 from eqs.pipelines.timing import PhaseTimes, phase_times
+from eqs.processors import available_cores
 from eqs.tasks import DetectionTask
 
 log = logging.getLogger(__name__)
@@ -47,7 +47,7 @@ def train(cfg: DictConfig) -> dict[str, Any]:
 def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -> None:
     """Do the work of one run and record what it measured."""
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
-    torch.set_num_threads(max(1, (os.cpu_count() or 1) // cfg.jobs))
+    torch.set_num_threads(max(1, available_cores() // cfg.jobs))
     tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
     if isinstance(source, RecordedEvents):
         del tests["own"]  # on the recorded events both tests are the same one

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import os
 import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -17,6 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from eqs.events.writer import EventWriter
 from eqs.files import read_json, write_json
+from eqs.processors import available_cores
 from eqs.scenes.camera import FrameCamera
 from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
@@ -293,7 +293,7 @@ class DSECMini:
 
     def _records(self, root: Path) -> list[dict[str, Any]]:
         recordings = self.recordings()
-        workers = min(self.workers or _usable_cores(), len(recordings))
+        workers = min(self.workers or available_cores(), len(recordings))
         jobs = [(recording, root) for recording in recordings]
         if workers <= 1:
             return self._follow(map(_write, jobs), len(jobs))
@@ -310,12 +310,6 @@ class DSECMini:
         )
         with Progress(*columns) as progress:
             return list(progress.track(records, total=total, description=f"dsec_mini {self.size}"))
-
-
-def _usable_cores() -> int:
-    if hasattr(os, "sched_getaffinity"):  # a container may grant fewer than there are
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _write(job: tuple[Recording, Path]) -> dict[str, Any]:
