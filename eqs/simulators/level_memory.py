@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.simulators.crossing import fire_levels, firing_pixels
-from eqs.simulators.noise import scatter_noise
+from eqs.simulators.noise import noisy_pixels, scatter_noise
 from eqs.simulators.ordering import Fired, with_room
 from eqs.simulators.randomness import draw_key, uniform_map
 from eqs.simulators.stream import Interval
@@ -28,6 +28,7 @@ class LevelMemory:
     def __init__(self, on: NDArray[np.float64], off: NDArray[np.float64]) -> None:
         """Start every pixel at the level of its last event."""
         self.on, self.off = on, off
+        self.least = float(on.min()), float(off.min())
         self.above, self.moved = np.zeros(on.size), np.zeros(on.size)
         self.last_us = np.full(on.size, -np.inf)
         self.chosen = np.empty(on.size + 1, np.int32)
@@ -75,8 +76,23 @@ class LevelMemory:
         noise_key: np.uint64,
         fired: Fired,
     ) -> Fired:
-        """Shot noise after the events that have fired; see `scatter_noise`."""
-        return scatter_noise(
+        """Shot noise after the events that have fired; see `noisy_pixels` and `scatter_noise`."""
+        noisy, total = noisy_pixels(
+            codes,
+            shot,
+            self.on,
+            self.off,
+            nominal,
+            self.least,
+            noise_key,
+            self.chosen,
+            self.passed,
+        )
+        keys, count = fired
+        keys = with_room(keys, count + total)
+        scatter_noise(
+            self.chosen[:noisy],
+            self.passed,
             codes,
             shot,
             self.above,
@@ -86,5 +102,6 @@ class LevelMemory:
             noise_key,
             interval.start_us,
             interval.span_us,
-            *fired,
+            keys[count:],
         )
+        return keys, count + total

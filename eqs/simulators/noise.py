@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.ordering import Fired, event_key, with_room
+from eqs.simulators.ordering import event_key
 from eqs.simulators.photoreceptor import MICROSECONDS, relative_light
 from eqs.simulators.randomness import draw_key, normal_map, poisson, uniform, word_at
 
@@ -51,7 +51,68 @@ def rate_map(
 
 
 @njit(cache=True, nogil=True)
+def noisy_pixels(
+    codes: NDArray[Any],
+    shot: NDArray[np.float64],
+    on: NDArray[np.float64],
+    off: NDArray[np.float64],
+    nominal: tuple[float, float],
+    least: tuple[float, float],
+    noise_key: np.uint64,
+    chosen: NDArray[np.int32],
+    numbers: NDArray[np.int64],
+) -> tuple[int, int]:
+    """List the pixels that fire noise, and Poisson numbers of events for them.
+
+    Args:
+        codes: index into `shot` of each pixel.
+        shot: expected events of one polarity at the nominal threshold, for each code.
+        on: threshold of each pixel.
+        off: the same for OFF, positive.
+        nominal: mean thresholds; noise is inversely proportional to a pixel's own.
+        least: smallest thresholds of the sensor.
+        noise_key: family of draws of this frame.
+        chosen: filled with the pixels, in rising order; one place longer than there are pixels.
+        numbers: filled with their numbers of events; as long as `chosen`.
+
+    Returns:
+        How many pixels are listed, and how many events they fire in all.
+    """
+    # No pixel expects more than this, so nearly all are known to be silent by their draw alone.
+    most = shot.max()
+    quiet = 1.0 - (most * nominal[0] / least[0] + most * nominal[1] / least[1])
+    candidates = 0
+    for pixel in range(codes.size):
+        chosen[candidates] = pixel
+        candidates += int(uniform(word_at(noise_key, pixel)) > quiet)
+    count = total = 0
+    for pixel in chosen[:candidates]:
+        expected = sum(_expected(pixel, codes, shot, on, off, nominal))
+        number = poisson(word_at(noise_key, pixel), expected)
+        chosen[count], numbers[count] = pixel, number
+        count += int(number > 0)
+        total += number
+    return count, total
+
+
+@njit(cache=True)
+def _expected(
+    pixel: int,
+    codes: NDArray[Any],
+    shot: NDArray[np.float64],
+    on: NDArray[np.float64],
+    off: NDArray[np.float64],
+    nominal: tuple[float, float],
+) -> tuple[float, float]:
+    """Expected ON and OFF noise events of a pixel."""
+    one = shot[codes[pixel]]
+    return one * nominal[0] / on[pixel], one * nominal[1] / off[pixel]
+
+
+@njit(cache=True, nogil=True)
 def scatter_noise(
+    chosen: NDArray[np.int32],
+    numbers: NDArray[np.int64],
     codes: NDArray[Any],
     shot: NDArray[np.float64],
     above: NDArray[np.float64],
@@ -62,36 +123,32 @@ def scatter_noise(
     start_us: int,
     span_us: int,
     keys: NDArray[np.int64],
-    count: int,
-) -> Fired:
-    """Fire Poisson numbers of noise events at random times; such pixels forget pending contrast.
+) -> None:
+    """Fire the noise of `noisy_pixels` at random times; such pixels forget pending contrast.
 
     Args:
+        chosen: the pixels that fire.
+        numbers: how many events each.
         codes: index into `shot` of each pixel.
         shot: expected events of one polarity at the nominal threshold, for each code.
         above: signal above reference of each pixel; 0 where noise fired.
         on: threshold of each pixel.
         off: the same for OFF, positive.
-        nominal: mean thresholds; noise is inversely proportional to a pixel's own.
+        nominal: mean thresholds.
         noise_key: family of draws of this frame.
         start_us: start of the interval.
         span_us: its length.
-        keys: buffer for the events.
-        count: how many events it holds already.
+        keys: filled with the events.
     """
-    for pixel in range(codes.size):
-        expected_on = shot[codes[pixel]] * nominal[0] / on[pixel]
-        expected_off = shot[codes[pixel]] * nominal[1] / off[pixel]
-        word = word_at(noise_key, pixel)
-        number = poisson(word, expected_on + expected_off)
-        if number == 0:
-            continue
+    count = 0
+    for index in range(chosen.size):
+        pixel = chosen[index]
         above[pixel] = 0.0
+        expected_on, expected_off = _expected(pixel, codes, shot, on, off, nominal)
         on_share = expected_on / (expected_on + expected_off)
-        keys = with_room(keys, count + number)
-        for ordinal in range(number):
+        word = word_at(noise_key, pixel)
+        for ordinal in range(numbers[index]):
             time_us = start_us + int(uniform(word_at(word, 2 * ordinal)) * span_us)
             polarity = 1 if uniform(word_at(word, 2 * ordinal + 1)) < on_share else 0
             keys[count] = event_key(time_us, pixel, polarity)
             count += 1
-    return keys, count
