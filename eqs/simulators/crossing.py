@@ -127,12 +127,14 @@ def fire_levels(
     """
     count = 0
     for index in range(chosen.size):
-        pixel = chosen[index]
-        polarity = 1 if passed[index] > 0 else 0
-        step = on[pixel] if polarity else -off[pixel]
+        pixel, levels = chosen[index], passed[index]
+        polarity = 1 if levels > 0 else 0
+        # Both are read, as choosing between two numbers costs no branch.
+        up, down = on[pixel], -off[pixel]
+        step = up if levels > 0 else down
         first, last, previous_us = above[pixel], moved[pixel], last_us[pixel] - start_us
         settled = 0
-        for ordinal in range(1, abs(passed[index]) + 1):
+        for ordinal in range(1, abs(levels) + 1):
             offset_us = crossing_share(ordinal * step, first, last) * span_us
             earliest_us = previous_us + refractory_us
             if offset_us < earliest_us:

@@ -188,12 +188,14 @@ def _fire_robust(
 ) -> int:
     count = 0
     for index in range(chosen.size):
-        pixel = chosen[index]
+        pixel, levels = chosen[index], passed[index]
         first, last = start[1][start[0][pixel]], end[1][end[0][pixel]]
-        polarity = 1 if passed[index] > 0 else 0
-        step = on[pixel] if polarity else -off[pixel]
-        for ordinal in range(1, abs(passed[index]) + 1):
-            level = reference[pixel] + ordinal * step
+        polarity = 1 if levels > 0 else 0
+        # Both are read, as choosing between two numbers costs no branch.
+        up, down, held = on[pixel], -off[pixel], reference[pixel]
+        step = up if levels > 0 else down
+        for ordinal in range(1, abs(levels) + 1):
+            level = held + ordinal * step
             offset_us = crossing_share(level, first, last) * span_us
             if refractory_us > 0:
                 if start_us + offset_us - last_us[pixel] < refractory_us:
@@ -201,7 +203,7 @@ def _fire_robust(
                 last_us[pixel] = start_us + offset_us
             keys[count] = event_key(start_us + int(offset_us), pixel, polarity)
             count += 1
-        reference[pixel] += abs(passed[index]) * step
+        reference[pixel] = held + abs(levels) * step
     return count
 
 

@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.base import Simulator, require_positive
-from eqs.simulators.ordering import Fired, event_key, with_room
+from eqs.simulators.ordering import event_key, with_room
 from eqs.simulators.stream import Interval
 
 REFERENCE_UPDATES = ("previous", "replace", "integrate", "never")
 BLOCKS = (1, 2, 4)
 _PREVIOUS, _REPLACE, _INTEGRATE, _NEVER = range(4)
+
+Held = tuple[NDArray[np.float64], NDArray[Any]]
+"""References, and the place of each pixel's among them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,13 +125,20 @@ class PIX2NVSPixels:
         """Settle on the first image."""
         self.model = model
         self.update = REFERENCE_UPDATES.index(model.reference_update)
-        first = log_luma(image.levels)[image.codes]
-        self.reference = np.zeros_like(first) if self.update == _INTEGRATE else first
-        self.threshold = np.full(first.size, float(model.threshold_log))
+        pixels = image.codes.size
+        # The reference of a pixel is `reference[places[pixel]]`: a table for the previous frame.
+        self.reference, self.places = log_luma(image.levels), image.codes
+        if self.update != _PREVIOUS:
+            self.reference = self.reference[image.codes]
+            self.places = np.arange(pixels, dtype=np.uint32)
+        if self.update == _INTEGRATE:
+            self.reference[:] = 0.0
+        self.threshold = np.full(pixels, float(model.threshold_log))
         blocks = -(-image.height // model.block) * -(-image.width // model.block)
         self.candidates = np.arange(blocks, dtype=np.uint32)  # a pixel is a block
-        self.chosen = np.empty(blocks, np.uint32)
-        self.keys = np.empty(first.size, np.int64)
+        self.chosen = np.empty(blocks + 1, np.uint32)
+        self.numbers = np.empty(blocks, np.int64)
+        self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
@@ -136,43 +146,49 @@ class PIX2NVSPixels:
         fixed = model.mode == "fixed"
         smallest_log = model.threshold_min_log if fixed else 0.0
         signal, adaptation = log_luma(image.levels), float(model.adaptation)
+        held = self.reference, self.places
         if model.block > 1:
             shape = (image.height, image.width, model.block)
-            _strongest_of_blocks(image.codes, signal, self.reference, shape, self.candidates)
-        firing = _firing(
+            _strongest_of_blocks(image.codes, signal, held, shape, self.candidates)
+        firing, total = _firing(
             self.candidates,
             image.codes,
             signal,
-            self.reference,
+            held,
             self.threshold,
             smallest_log,
             adaptation,
+            model.max_events,
             self.chosen,
+            self.numbers,
         )
-        self.keys, count = _fire(
+        self.keys = with_room(self.keys, total)
+        _fire(
             self.chosen[:firing],
+            self.numbers,
             image.codes,
             signal,
-            self.reference,
+            held,
             self.threshold,
             model.threshold_max_log if fixed else math.inf,
             adaptation,
             self.update,
-            model.max_events,
             # The program stamps one interval late, and rounds where we floor.
             interval.start_us if fixed else interval.stop_us,
             0.0 if fixed else 0.5,
             interval.span_us,
             self.keys,
         )
-        return self.keys[:count]
+        if self.update == _PREVIOUS:
+            self.reference, self.places = signal, image.codes
+        return self.keys[:total]
 
 
 @njit(cache=True)
 def _strongest(
     codes: NDArray[Any],
     signal: NDArray[np.float64],
-    reference: NDArray[np.float64],
+    held: Held,
     rows: tuple[int, int],
     columns: tuple[int, int],
     width: int,
@@ -182,7 +198,7 @@ def _strongest(
     for y in range(rows[0], rows[1]):
         for x in range(columns[0], columns[1]):
             pixel = y * width + x
-            distance = abs(signal[codes[pixel]] - reference[pixel])
+            distance = abs(signal[codes[pixel]] - held[0][held[1][pixel]])
             if distance > largest:
                 winner, largest = pixel, distance
     return winner
@@ -192,7 +208,7 @@ def _strongest(
 def _strongest_of_blocks(
     codes: NDArray[Any],
     signal: NDArray[np.float64],
-    reference: NDArray[np.float64],
+    held: Held,
     shape: tuple[int, int, int],
     candidates: NDArray[np.uint32],
 ) -> None:
@@ -202,7 +218,7 @@ def _strongest_of_blocks(
         rows = (top, min(top + block, height))
         for left in range(0, width, block):
             columns = (left, min(left + block, width))
-            candidates[count] = _strongest(codes, signal, reference, rows, columns, width)
+            candidates[count] = _strongest(codes, signal, held, rows, columns, width)
             count += 1
 
 
@@ -211,58 +227,64 @@ def _firing(
     candidates: NDArray[np.uint32],
     codes: NDArray[Any],
     signal: NDArray[np.float64],
-    reference: NDArray[np.float64],
+    held: Held,
     threshold: NDArray[np.float64],
     smallest_log: float,
     adaptation: float,
+    max_events: int,
     chosen: NDArray[np.uint32],
-) -> int:
-    """Write the candidates that fire to `chosen`; the others adapt."""
+    numbers: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Write the candidates that fire to `chosen`, with signed `numbers`; the others adapt."""
+    reference, places = held
     count = 0
     for pixel in candidates:
         limit = threshold[pixel]
-        fires = abs(signal[codes[pixel]] - reference[pixel]) > limit
+        fires = abs(signal[codes[pixel]] - reference[places[pixel]]) > limit
         # Written in either case: a branch would cost more.
         chosen[count] = pixel
         count += fires
         threshold[pixel] = limit if fires else max(limit * (1.0 - adaptation), smallest_log)
-    return count
+    total = 0
+    for index in range(count):
+        pixel = chosen[index]
+        difference = signal[codes[pixel]] - reference[places[pixel]]
+        number = int(min(abs(difference) / threshold[pixel], float(max_events)))
+        numbers[index] = number if difference > 0 else -number
+        total += number
+    return count, total
 
 
 @njit(cache=True, nogil=True)
 def _fire(
     chosen: NDArray[np.uint32],
+    numbers: NDArray[np.int64],
     codes: NDArray[Any],
     signal: NDArray[np.float64],
-    reference: NDArray[np.float64],
+    held: Held,
     threshold: NDArray[np.float64],
     largest_log: float,
     adaptation: float,
     update: int,
-    max_events: int,
     base_us: int,
     rounding: float,
     span_us: int,
     keys: NDArray[np.int64],
-) -> Fired:
+) -> None:
     """Fire the chosen pixels, which adapt the other way."""
+    reference, places = held
     count = 0
-    for pixel in chosen:
-        limit = threshold[pixel]
-        difference = signal[codes[pixel]] - reference[pixel]
-        distance = abs(difference)
-        number = int(min(distance / limit, float(max_events)))
-        keys = with_room(keys, count + number)
-        for ordinal in range(1, number + 1):
+    for index in range(chosen.size):
+        pixel, number = chosen[index], numbers[index]
+        limit, value = threshold[pixel], signal[codes[pixel]]
+        distance = abs(value - reference[places[pixel]])
+        polarity = 1 if number > 0 else 0
+        for ordinal in range(1, abs(number) + 1):
             offset_us = int(ordinal * limit / distance * span_us + rounding)
-            keys[count] = event_key(base_us + offset_us, pixel, 1 if difference > 0 else 0)
+            keys[count] = event_key(base_us + offset_us, pixel, polarity)
             count += 1
         if update == _REPLACE:
-            reference[pixel] = signal[codes[pixel]]
+            reference[pixel] = value
         elif update == _INTEGRATE:
-            reference[pixel] += number * limit if difference > 0 else -number * limit
+            reference[pixel] += number * limit
         threshold[pixel] = min(limit * (1.0 + adaptation), largest_log)
-    if update == _PREVIOUS:
-        for pixel in range(codes.size):
-            reference[pixel] = signal[codes[pixel]]
-    return keys, count
