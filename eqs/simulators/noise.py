@@ -14,6 +14,8 @@ from eqs.simulators.ordering import event_key
 from eqs.simulators.photoreceptor import MICROSECONDS, relative_light
 from eqs.simulators.randomness import draw_key, normal_map, poisson, uniform, word_at
 
+_RUN = 64  # pixels that are ruled out together
+
 
 def shot_events(
     levels: NDArray[np.float64], shot_noise_hz: float, span_us: int
@@ -82,9 +84,16 @@ def noisy_pixels(
     most = shot.max()
     quiet = 1.0 - (most * nominal[0] / least[0] + most * nominal[1] / least[1])
     candidates = 0
-    for pixel in range(codes.size):
-        chosen[candidates] = pixel
-        candidates += int(uniform(word_at(noise_key, pixel)) > quiet)
+    for first in range(0, codes.size, _RUN):
+        run = range(first, min(first + _RUN, codes.size))
+        largest = np.uint64(0)
+        for pixel in run:
+            largest = max(largest, word_at(noise_key, pixel))
+        if uniform(largest) <= quiet:
+            continue
+        for pixel in run:
+            chosen[candidates] = pixel
+            candidates += int(uniform(word_at(noise_key, pixel)) > quiet)
     count = total = 0
     for pixel in chosen[:candidates]:
         expected = sum(_expected(pixel, codes, shot, on, off, nominal))
