@@ -95,6 +95,7 @@ def _merged(first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.i
     return both
 
 
+@njit(cache=True, nogil=True)
 def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
     """Sort the keys of one frame interval by (time, pixel); equal ones keep their order.
 
@@ -108,9 +109,9 @@ def ordered(keys: NDArray[np.int64], start_us: int) -> NDArray[np.int64]:
     base = start_us << TIME_SHIFT
     run = _raster_run(keys)
     first, rest = _radix_sorted(keys[:run], base, TIME_SHIFT), keys[run:]
-    if not len(rest):
+    if rest.size == 0:
         return first
-    lowest_bit = TIME_SHIFT if _raster_run(rest) == len(rest) else 1
+    lowest_bit = TIME_SHIFT if _raster_run(rest) == rest.size else 1
     return _merged(first, _radix_sorted(rest, base, lowest_bit))
 
 
