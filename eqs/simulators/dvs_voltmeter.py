@@ -6,20 +6,17 @@ Sensors", ECCV 2022.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
-from eqs.simulators.ordering import Fired, event_key, with_room
-from eqs.simulators.passage import chance_of_on, passage_time
-from eqs.simulators.randomness import draw_key, mixed, uniform, uniform_map, word_at
+from eqs.simulators.randomness import draw_key, uniform_map
 from eqs.simulators.stream import Interval
+from eqs.simulators.voltage import Motion, fire, move_quiet
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,72 +111,41 @@ class DVSVoltmeterPixels:
             # Drifting from 0 to 1 again and again, a pixel is as likely at one place as another.
             key = draw_key(model.seed, "leak phase", sequence, first_pixel=image.first_pixel)
             self.voltage = uniform_map(key, pixels)
+        self.motion = Motion(
+            float(model.contrast_gain),
+            float(model.dark_level),
+            float(model.leak_per_us),
+            float(model.light_leak_per_us),
+            float(model.photon_noise_per_sqrt_us),
+            float(model.thermal_noise_per_sqrt_us),
+        )
+        self.chosen = np.arange(pixels + 1, dtype=np.int32)
         self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
-        model = self.model
-        self.keys, count = _fire(
-            (self.image.codes, self.image.levels),
-            (image.codes, image.levels),
+        faithful, left = self.model.mode == "faithful", image.codes.size
+        seen = (self.image.codes, self.image.levels), (image.codes, image.levels)
+        key = draw_key(
+            self.model.seed,
+            "motion",
+            self.sequence,
+            str(interval.frame),
+            first_pixel=image.first_pixel,
+        )
+        span_us = interval.span_us
+        if not faithful:
+            left = move_quiet(*seen, self.voltage, self.motion, key, span_us, self.chosen)
+        self.keys, count = fire(
+            self.chosen[:left],
+            *seen,
             self.voltage,
-            (model.contrast_gain, model.dark_level, model.leak_per_us, model.light_leak_per_us),
-            (model.photon_noise_per_sqrt_us, model.thermal_noise_per_sqrt_us),
-            model.mode == "faithful",
-            draw_key(
-                model.seed,
-                "motion",
-                self.sequence,
-                str(interval.frame),
-                first_pixel=image.first_pixel,
-            ),
+            self.motion,
+            faithful,
+            key,
             interval.start_us,
-            interval.span_us,
+            span_us,
             self.keys,
         )
         self.image = image
         return self.keys[:count]
-
-
-@njit(cache=True, nogil=True)
-def _fire(
-    start: tuple[NDArray[Any], NDArray[np.float64]],
-    end: tuple[NDArray[Any], NDArray[np.float64]],
-    voltage: NDArray[np.float64],
-    drifts: tuple[float, float, float, float],
-    spreads: tuple[float, float],
-    faithful: bool,
-    frame_key: np.uint64,
-    start_us: int,
-    span_us: int,
-    keys: NDArray[np.int64],
-) -> Fired:
-    gain, dark, leak, light_leak = drifts
-    gain_per_us = gain / span_us
-    rounding = 0.5 if faithful else 0.0
-    count = 0
-    for pixel in range(voltage.size):
-        first, last = start[1][start[0][pixel]], end[1][end[0][pixel]]
-        light = 0.5 * (first + last)
-        relative = 1.0 / (light + dark)
-        drift = gain_per_us * (last - first) * relative + leak + light_leak * light
-        spread = spreads[0] * math.sqrt(light) * relative + spreads[1]
-        level, elapsed_us = voltage[pixel], 0.0
-        word = word_at(frame_key, pixel)
-        while True:
-            chance = chance_of_on(level, drift, spread, faithful)
-            up = chance == 1.0 or uniform(word_at(word, 0)) < chance
-            distance = 1.0 - level if up else 1.0 + level
-            towards = drift if up else -drift
-            wait_us = passage_time(distance, towards, spread, word, faithful)
-            if elapsed_us + wait_us >= span_us:
-                moved = distance * (span_us - elapsed_us) / wait_us
-                voltage[pixel] = level + moved if up else level - moved
-                break
-            elapsed_us += wait_us
-            keys = with_room(keys, count + 1)
-            keys[count] = event_key(start_us + int(elapsed_us + rounding), pixel, 1 if up else 0)
-            level = 0.0
-            word = mixed(word)
-            count += 1
-    return keys, count

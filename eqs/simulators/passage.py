@@ -14,7 +14,7 @@ from numba import njit
 from eqs.simulators.randomness import normal, uniform, word_at, ziggurat_normal
 
 _SMALLEST_SQUARE = 1e-300
-_CERTAIN = 40.0  # exponents from which on a chance is nought or one to the last bit
+CERTAIN = 40.0  # exponents from which on a chance is nought or one to the last bit
 _MOST_ATTEMPTS = 1000
 
 
@@ -38,9 +38,9 @@ def chance_of_on(level: float, drift: float, spread: float, faithful: bool) -> f
         return 1.0 if drift > 0 else 0.0
     scale = 2.0 * drift / (spread * spread)
     ahead, behind = scale * (1.0 - level), scale * (1.0 + level)
-    if behind > _CERTAIN:
+    if behind > CERTAIN:
         return 1.0
-    if ahead < -_CERTAIN:
+    if ahead < -CERTAIN:
         return 0.0
     if drift > 0:
         return np.expm1(-behind) / np.expm1(-(ahead + behind))
@@ -72,9 +72,26 @@ def passage_time(
         return _misdrawn_passage(mean, (distance / spread) ** 2, word)
     size = ziggurat_normal(word_at(word, 1))
     half = 0.5 * (size * spread) ** 2 / (distance * abs(towards))
-    stretch = 1.0 + half + math.sqrt(half * (half + 2.0))
-    shorter = 1.0 / stretch  # computed in either case, so that the even choice costs no branch
-    return mean * (shorter if uniform(word_at(word, 2)) * (1.0 + shorter) <= 1.0 else stretch)
+    return mean * stretched(half, uniform(word_at(word, 2)))
+
+
+# Without a branch, and with infinite numbers in place of errors, so that loops over pixels can
+# compute several at a time.
+@njit(cache=True, error_model="numpy")
+def stretched(half: float, share: float) -> float:
+    """An inverse Gaussian number of mean 1: one of the two roots that a normal number gives.
+
+    Args:
+        half: half the square of the normal number, over the shape parameter.
+        share: uniform number that chooses the root.
+
+    Example:
+        >>> stretched(0.5, 0.0) * stretched(0.5, 0.99)
+        1.0
+    """
+    longer = 1.0 + half + math.sqrt(half * (half + 2.0))
+    shorter = 1.0 / longer
+    return shorter if share * (1.0 + shorter) <= 1.0 else longer
 
 
 @njit(cache=True)

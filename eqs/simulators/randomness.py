@@ -22,7 +22,7 @@ _LOW = np.uint64(0xFFFFFFFF)
 _S30, _S27, _S31, _S32, _S11 = (np.uint64(shift) for shift in (30, 27, 31, 32, 11))
 _QUANTILE_MASK = np.uint64(2047)
 _LARGEST_POISSON = 10_000
-_LAYER_MASK = np.uint64(127)
+_LAYER_MASK, _NEXT = np.uint64(127), np.uint64(1)
 _LAST_LAYER, _LAYER_AREA = 3.442619855899, 9.91256303526217e-3  # of 128 layers
 
 
@@ -103,21 +103,35 @@ def ziggurat_normal(word: np.uint64) -> float:
     nearly always a product and a comparison; else more bits follow from the same word.
     """
     while True:
-        layer = np.int64(word & _LAYER_MASK)
-        side = 2.0 * uniform(word) - 1.0
-        size = abs(side) * ZIGGURAT[layer]
-        if size < ZIGGURAT[layer + 1]:
-            break
+        size = layered_size(word)
+        if math.isnan(size):
+            size = _size_by_more_bits(word)
+        if not math.isnan(size):
+            return math.copysign(size, 2.0 * uniform(word) - 1.0)
         word = word_at(word, 0)
-        if layer == 0:
-            size = _tail(word)
-            break
-        low, high = ZIGGURAT[layer], ZIGGURAT[layer + 1]
-        share = uniform(word_at(word, 1))
-        heights = math.exp(-0.5 * low * low), math.exp(-0.5 * high * high)
-        if heights[0] + share * (heights[1] - heights[0]) < math.exp(-0.5 * size * size):
-            break
-    return math.copysign(size, side)
+
+
+@njit(cache=True)
+def layered_size(word: np.uint64) -> float:
+    """The size of a `ziggurat_normal`, or NaN where its layer alone does not settle it."""
+    layer = word & _LAYER_MASK
+    size = abs(2.0 * uniform(word) - 1.0) * ZIGGURAT[layer]
+    return size if size < ZIGGURAT[layer + _NEXT] else np.nan
+
+
+@njit(cache=True)
+def _size_by_more_bits(word: np.uint64) -> float:
+    """The size where the layer does not settle it; NaN where a new word is needed."""
+    layer = np.int64(word & _LAYER_MASK)
+    size = abs(2.0 * uniform(word) - 1.0) * ZIGGURAT[layer]
+    word = word_at(word, 0)
+    if layer == 0:
+        return _tail(word)
+    low, high = ZIGGURAT[layer], ZIGGURAT[layer + 1]
+    share = uniform(word_at(word, 1))
+    heights = math.exp(-0.5 * low * low), math.exp(-0.5 * high * high)
+    inside = heights[0] + share * (heights[1] - heights[0]) < math.exp(-0.5 * size * size)
+    return size if inside else np.nan
 
 
 @njit(cache=True)
