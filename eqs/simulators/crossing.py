@@ -30,11 +30,9 @@ def levels_passed(difference: float, threshold_on: float, threshold_off: float) 
         >>> levels_passed(0.7, 0.2, 0.3), levels_passed(-0.6, 0.2, 0.3)
         (3, -2)
     """
-    if difference >= threshold_on * _ALMOST_ONE:
-        return int(difference / threshold_on + RELATIVE_TOLERANCE)
-    if difference <= -threshold_off * _ALMOST_ONE:
-        return -int(-difference / threshold_off + RELATIVE_TOLERANCE)
-    return 0
+    step = threshold_on if difference > 0 else -threshold_off
+    levels = int(difference / step + RELATIVE_TOLERANCE)
+    return levels if difference > 0 else -levels
 
 
 @njit(cache=True, nogil=True)

@@ -9,11 +9,15 @@ from __future__ import annotations
 
 import hashlib
 import math
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from statistics import NormalDist
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from eqs.simulators.bands import useful_bands
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _FIRST = np.uint64(0xBF58476D1CE4E5B9)
@@ -165,13 +169,20 @@ def poisson(word: np.uint64, expected: float) -> int:
     return number
 
 
-@njit(cache=True)
 def normal_map(key: np.uint64, size: int) -> NDArray[np.float64]:
     """`size` independent standard normal numbers, one for each pixel."""
     values = np.empty(size, np.float64)
-    for pixel in range(size):
-        values[pixel] = normal(word_at(key, pixel))
+    parts = np.array_split(values, useful_bands(size))
+    firsts = np.cumsum([0, *map(len, parts)])
+    with ThreadPoolExecutor(len(parts)) as beside:
+        list(beside.map(partial(_draw_normals, key), firsts, parts))
     return values
+
+
+@njit(cache=True, nogil=True)
+def _draw_normals(key: np.uint64, first: int, values: NDArray[np.float64]) -> None:
+    for index in range(values.size):
+        values[index] = normal(word_at(key, first + index))
 
 
 @njit(cache=True)
