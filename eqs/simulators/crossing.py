@@ -49,7 +49,7 @@ def firing_pixels(
         difference: signal above reference of each pixel.
         threshold_on: threshold of each pixel.
         threshold_off: the same for OFF, positive.
-        chosen: filled with the pixels, in rising order; one place longer than there are pixels.
+        chosen: filled with the pixels, in rising order; a place for each.
         passed: filled with their signed numbers of levels; as long as `chosen`.
 
     Returns:

@@ -119,7 +119,7 @@ class DVSVoltmeterPixels:
             float(model.photon_noise_per_sqrt_us),
             float(model.thermal_noise_per_sqrt_us),
         )
-        self.chosen = np.arange(pixels + 1, dtype=np.int32)
+        self.chosen = np.arange(pixels, dtype=np.int32)
         self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:

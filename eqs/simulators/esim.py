@@ -106,8 +106,8 @@ class ESIMPixels:
         self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image)
         self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image)
         self.difference = np.empty(pixels)
-        self.chosen = np.empty(pixels + 1, np.int32)
-        self.passed = np.empty(pixels + 1, np.int64)
+        self.chosen = np.empty(pixels, np.int32)
+        self.passed = np.empty(pixels, np.int64)
         self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:

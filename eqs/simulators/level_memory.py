@@ -31,8 +31,8 @@ class LevelMemory:
         self.least = float(on.min()), float(off.min())
         self.above, self.moved = np.zeros(on.size), np.zeros(on.size)
         self.last_us = np.full(on.size, -np.inf)
-        self.chosen = np.empty(on.size + 1, np.int32)
-        self.passed = np.empty(on.size + 1, np.int64)
+        self.chosen = np.empty(on.size, np.int32)
+        self.passed = np.empty(on.size, np.int64)
 
     def start_on_the_way(self, seed: int, sequence: str) -> None:
         """Place each pixel somewhere on its way to the next ON event, as leaks do over time."""

@@ -74,7 +74,7 @@ def noisy_pixels(
         nominal: mean thresholds; noise is inversely proportional to a pixel's own.
         least: smallest thresholds of the sensor.
         noise_key: family of draws of this frame.
-        chosen: filled with the pixels, in rising order; one place longer than there are pixels.
+        chosen: filled with the pixels, in rising order; a place for each.
         numbers: filled with their numbers of events; as long as `chosen`.
 
     Returns:

@@ -136,7 +136,7 @@ class PIX2NVSPixels:
         self.threshold = np.full(pixels, float(model.threshold_log))
         blocks = -(-image.height // model.block) * -(-image.width // model.block)
         self.candidates = np.arange(blocks, dtype=np.uint32)  # a pixel is a block
-        self.chosen = np.empty(blocks + 1, np.uint32)
+        self.chosen = np.empty(blocks, np.uint32)
         self.numbers = np.empty(blocks, np.int64)
         self.keys = np.empty(pixels, np.int64)
 

@@ -73,8 +73,7 @@ def move_quiet(
         motion: what drives it.
         frame_key: family of draws of this interval.
         span_us: its length.
-        others: filled with the pixels left to `fire`, in rising order; one place longer than there
-            are pixels.
+        others: filled with the pixels left to `fire`, in rising order; a place for each.
 
     Returns:
         How many pixels are listed.

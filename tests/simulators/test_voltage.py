@@ -48,7 +48,7 @@ def test_quiet_pixels_move_as_they_do_one_by_one(motion):
     one_by_one = voltage.copy()
     everyone = np.arange(PIXELS, dtype=np.int32)
     expected = fired(everyone, one_by_one, motion)
-    others = np.empty(PIXELS + 1, np.int32)
+    others = np.empty(PIXELS, np.int32)
     left = move_quiet(start, end, voltage, motion, draw_key(0, "motion"), SPAN_US, others)
     assert np.array_equal(fired(others[:left], voltage, motion), expected)
     assert np.array_equal(voltage, one_by_one)
@@ -56,7 +56,7 @@ def test_quiet_pixels_move_as_they_do_one_by_one(motion):
 
 def test_most_pixels_of_a_camera_are_moved_together():
     start, end, voltage = scene()
-    others = np.empty(PIXELS + 1, np.int32)
+    others = np.empty(PIXELS, np.int32)
     left = move_quiet(start, end, voltage, CAMERA, draw_key(0, "motion"), SPAN_US, others)
     firing = np.unique(fired(others[:left], voltage.copy(), CAMERA) & ((1 << TIME_SHIFT) - 2)).size
     assert firing < left < firing + 0.1 * PIXELS
