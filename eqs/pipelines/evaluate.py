@@ -45,7 +45,8 @@ def evaluate(cfg: DictConfig) -> None:
     if runs:
         study = study_table(study_rows(runs))
         write_table(study, results / "study.csv")
-        print_study(study, console)
+        if not cfg.score:
+            print_study(study, console)
     elif not cfg.score:
         raise ValueError(
             f"Expected a finished run on {cfg.data.name} with this recipe, got none; "
@@ -123,6 +124,8 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         study=study_table(study, table) if runs else None,
     )
     print_eqs(table, console)
+    if found.study is not None:
+        print_study(found.study, console)
     with times.measure("report"):
         publish(cfg, results, data, found, times.read())
     console.print(f"[bold]judge[/bold]: {judge.description} ({judge.weights_sha256[:12]})")

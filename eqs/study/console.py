@@ -12,23 +12,26 @@ from eqs.study.layout import Table, number, scores_table
 from eqs.study.sanity import order_faults, readings, severity_correlations
 from eqs.study.tables import MAP_COLUMNS, Drops, score_columns, summarise_eqs, summarise_study
 
+CELL_FRAME = 3  # a border and a space on either side
+
 
 def print_study(study: pd.DataFrame, console: Console) -> None:
     """Print mAP and drops of every system, means over seeds, times 100 as the paper does."""
     systems = summarise_study(study)
-    names = ["system", "seeds", *MAP_COLUMNS, *Drops._fields, "eqs"]
-    console.print(_drawn(_chosen(systems, names), "Detection accuracy (mAP, drops: x 100)"))
+    several = ["seeds"] if systems["seeds"].gt(1).any() else []
+    names = ["system", *several, *MAP_COLUMNS, *Drops._fields, "eqs"]
+    _print(_chosen(systems, names), "Detection accuracy (mAP, drops: x 100)", console)
 
 
 def print_eqs(eqs: pd.DataFrame, console: Console) -> None:
     """Print the scores of every system: by sequence, then means with chance and ceiling."""
-    console.print(_drawn(scores_table(eqs), "EQS by sequence (higher is better)"))
+    _print(scores_table(eqs), "EQS by sequence (higher is better)", console)
     means = summarise_eqs(eqs)
     names = ["system", "sequences", "eqs", "eqs_chance", "eqs_ceiling", "eqs_scaled"]
     variants = [name for name in score_columns(means) if name != "eqs"]
-    console.print(_drawn(_chosen(means, names), "Event Quality Score (higher is better)"))
+    _print(_chosen(means, names), "Event Quality Score (higher is better)", console)
     if variants:
-        console.print(_drawn(_chosen(means, ["system", *variants]), "EQS by activation"))
+        _print(_chosen(means, ["system", *variants]), "EQS by activation", console)
 
 
 def print_sanity(
@@ -42,7 +45,7 @@ def print_sanity(
         )
         for row in table.to_dict("records")
     )
-    console.print(_drawn(Table(header=("corruption", headline), rows=rows), "Sanity battery"))
+    _print(Table(header=("corruption", headline), rows=rows), "Sanity battery", console)
     for name in [headline, *(name for name in readings(table) if name != headline)]:
         faults = order_faults(table, name, expected)
         verdict = "as expected" if not faults else "not as expected, " + ", ".join(faults)
@@ -58,11 +61,36 @@ def _chosen(frame: pd.DataFrame, names: list[str]) -> Table:
     return Table(header=tuple(names), rows=rows)
 
 
-def _drawn(table: Table, title: str) -> ConsoleTable:
-    drawn = ConsoleTable(title=title)
-    for place, name in enumerate(table.header):
-        heading = name.replace("_", " ")  # a heading breaks at spaces, a name nowhere
-        drawn.add_column(heading, justify="right" if place else "left", no_wrap=not place)
-    for row in table.rows:
-        drawn.add_row(*row)
-    return drawn
+def _print(table: Table, title: str, console: Console) -> None:
+    """Print a table, in several that begin alike where the terminal is too narrow for one."""
+    # A heading has a word a line; a name, which others may want to copy, stays whole.
+    corner, *others = table.header
+    headings = [corner, *(name.replace("_", "\n") for name in others)]
+    columns = zip(*table.rows, strict=True) if table.rows else [()] * len(headings)
+    widths = [
+        max(map(len, [*heading.splitlines(), *cells]))
+        for heading, cells in zip(headings, columns, strict=True)
+    ]
+    for places in _columns_that_fit(widths, console.width):
+        drawn = ConsoleTable(title=title)
+        for place in places:
+            drawn.add_column(headings[place], justify="right" if place else "left", no_wrap=True)
+        for row in table.rows:
+            drawn.add_row(*(row[place] for place in places))
+        console.print(drawn)
+
+
+def _columns_that_fit(widths: Sequence[int], width: int) -> list[list[int]]:
+    """Places of the columns of each table, the first column in all of them.
+
+    Example:
+        >>> _columns_that_fit([10, 30, 30, 30], width=80)
+        [[0, 1, 2], [0, 3]]
+    """
+    tables = [[0]]
+    for place in range(1, len(widths)):
+        used = sum(widths[other] + CELL_FRAME for other in [*tables[-1], place]) + 1
+        if used > width and len(tables[-1]) > 1:
+            tables.append([0])
+        tables[-1].append(place)
+    return tables

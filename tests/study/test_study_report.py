@@ -204,3 +204,18 @@ def test_console_shows_what_the_tables_hold(study, scores):
     assert "higher is better" in text
     assert "18.5" in text
     assert f"{scores[scores['system'] == 'v2e']['eqs'].mean():.3f}" in text
+
+
+@pytest.mark.parametrize("width", [60, 80, 200])
+def test_many_systems_are_legible_on_a_narrow_terminal(scores, width):
+    names = ("esim", "improved_esim", "dvs_voltmeter", "prophesee", "carla", "gazebo", "icns")
+    systems = [scores[scores["system"] == "v2e"].assign(system=name) for name in names]
+    many = pd.concat(systems).assign(simulator="v2e")
+    out = io.StringIO()
+    console = Console(file=out, width=width, color_system=None)
+    print_eqs(many, console)
+    text = out.getvalue()
+    assert "\N{HORIZONTAL ELLIPSIS}" not in text
+    assert max(map(len, text.splitlines())) <= width
+    cells = [cell.strip() for line in text.splitlines() for cell in line.split("\u2502")]
+    assert cells.count(f"{many['eqs'].iloc[0]:.3f}") >= len(names)
