@@ -19,4 +19,5 @@ def main(cfg: DictConfig) -> None:
 if __name__ == "__main__":
     # Hydra reads only key=value, so a flag is a spelling of one; it may stand anywhere.
     sys.argv = [FLAGS.get(argument, argument) for argument in sys.argv]
-    main()
+    with pipelines.keys_explained():
+        main()

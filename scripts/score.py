@@ -19,4 +19,5 @@ if __name__ == "__main__":
     plain = [k for k, a in enumerate(sys.argv) if k and "=" not in a and not a.startswith("-")]
     for key, place in zip(("simulated", "real"), plain, strict=False):
         sys.argv[place] = f"{key}={sys.argv[place]}"
-    main()
+    with pipelines.keys_explained():
+        main()

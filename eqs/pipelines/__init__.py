@@ -1,6 +1,7 @@
 """What a command does: configuration to objects to files."""
 
 from eqs.pipelines.calibrate import calibrate
+from eqs.pipelines.command import keys_explained
 from eqs.pipelines.detections import detections_over
 from eqs.pipelines.drawing import DetectionPictures
 from eqs.pipelines.evaluate import evaluate
@@ -19,6 +20,7 @@ __all__ = [
     "calibrate",
     "detections_over",
     "evaluate",
+    "keys_explained",
     "prepare",
     "register_resolvers",
     "score_files",

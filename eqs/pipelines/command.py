@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import difflib
 import functools
 import logging
 import os
+import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
 from hydra.errors import InstantiationException
 from omegaconf import DictConfig
-from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
+from omegaconf.errors import (
+    ConfigAttributeError,
+    ConfigKeyError,
+    MissingMandatoryValue,
+    OmegaConfBaseException,
+)
 
 log = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -37,6 +45,27 @@ def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig],
             raise SystemExit(1) from error
 
     return run
+
+
+@contextmanager
+def keys_explained() -> Iterator[None]:
+    """Add to Hydra's complaint about a key that does not exist those that may have been meant."""
+    try:
+        yield
+    except SystemExit as stop:
+        cause = getattr(stop.__context__, "__cause__", None)
+        if isinstance(cause, ConfigAttributeError | ConfigKeyError):
+            sys.stderr.write(existing_keys(cause) + "\n")
+        raise
+
+
+def existing_keys(error: ConfigAttributeError | ConfigKeyError) -> str:
+    """What could have been written in place of a key that does not exist."""
+    place, _, key = str(error.full_key).rpartition(".")
+    names = [str(name) for name in error.parent_node or () if not str(name).startswith("_")]
+    near = difflib.get_close_matches(key, names, n=3) or sorted(names)
+    keys = ", ".join(f"{place}.{name}" if place else name for name in near)
+    return f"Expected a key that exists, got {error.full_key}; set {keys}"
 
 
 def check_seed(cfg: DictConfig) -> None:

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 from hydra import compose, initialize_config_dir
+from hydra.errors import ConfigCompositionException
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 import eqs
 from eqs.pipelines import register_resolvers
-from eqs.pipelines.command import explained
+from eqs.pipelines.command import explained, keys_explained
 
 CONFIGS = Path(eqs.__file__).parent.parent / "configs"
 
@@ -88,3 +89,28 @@ def test_a_mistake_of_ours_keeps_its_traceback() -> None:
 
     with pytest.raises(TypeError, match="ours"):
         explained(broken)(composed())
+
+
+@pytest.mark.parametrize(
+    ("override", "wanted"),
+    [
+        ("sim.treshold_on_log=0.3", "got sim.treshold_on_log; set sim.threshold_on_log, "),
+        ("sead=1", "got sead; set seed\n"),
+        ("datamodule.zzz=1", "got datamodule.zzz; set datamodule."),
+    ],
+)
+def test_a_key_that_does_not_exist_names_those_that_do(
+    capsys: pytest.CaptureFixture[str], override: str, wanted: str
+) -> None:
+    def as_hydra_does() -> None:
+        try:
+            composed(override)
+        except ConfigCompositionException:
+            raise SystemExit(1)  # noqa: B904 - the mistake is the context, not the cause
+
+    with pytest.raises(SystemExit), keys_explained():
+        as_hydra_does()
+    message = capsys.readouterr().err
+    assert message.startswith("Expected a key that exists, ")
+    assert wanted in message
+    assert "_target_" not in message
