@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from pathlib import Path
 
 from eqs.benchmarks import rvt, scoring, simulators
 
@@ -13,6 +14,7 @@ def main() -> None:
     clip = parser.add_argument_group("simulators and eqs")
     clip.add_argument("--frames", type=int, help="60 for simulators, 300 windows for eqs")
     clip.add_argument("--size", default="640x480", help="width and height")
+    clip.add_argument("--clip", type=Path, help="simulators: a folder of images, taken as 20 Hz")
     clip.add_argument(
         "--only",
         nargs="*",
@@ -30,7 +32,11 @@ def main() -> None:
     if given.what == "eqs":
         scoring.print_table(given.frames or 300, int(width), int(height))
     else:
-        simulators.print_table(given.frames or 60, int(width), int(height), given.only)
+        size = int(width), int(height)
+        try:
+            simulators.print_table(given.frames or 60, *size, given.only, given.clip)
+        except (OSError, ValueError) as error:
+            sys.exit(f"{error} (--clip)")
 
 
 if __name__ == "__main__":

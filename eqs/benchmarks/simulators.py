@@ -1,4 +1,4 @@
-"""Time the simulators, on a clip drawn here.
+"""Time the simulators, on a clip drawn here or on images at 20 Hz.
 
 Each simulator runs in a process of its own, once on a corner of the clip to compile, then on the
 whole; the fastest run counts. Frames are in memory before, events are complete and in order of time
@@ -8,7 +8,8 @@ after.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from rich.console import Console
 from rich.table import Table
 
 from eqs import simulators
-from eqs.benchmarks.timing import in_own_process, time_runs
+from eqs.benchmarks.timing import Cost, in_own_process, time_runs
+from eqs.frames import FrameFolder, image_paths
 
 NAMES = tuple(
     name
@@ -61,15 +63,45 @@ def configured(name: str, threshold_log: float) -> Any:  # noqa: ANN401 - one of
     return kind(**values)
 
 
-def measure(job: tuple[str, float, tuple[int, int, int]]) -> tuple[int, float, float]:
-    """Events, seconds and MiB of memory beyond clip and program."""
-    name, threshold_log, shape = job
-    simulator = configured(name, threshold_log)
-    clip, times_us = draw_clip(*shape), PERIOD_US * np.arange(shape[0])
+@dataclass(frozen=True)
+class Job:
+    """One line of the table.
+
+    Args:
+        name: class of the simulator.
+        threshold_log: its mean thresholds, where it has such.
+        frames: how many frames at 20 Hz.
+        size: rows and columns of a clip drawn here.
+        folder: images to take the frames from instead.
+    """
+
+    name: str
+    threshold_log: float
+    frames: int
+    size: tuple[int, int]
+    folder: Path | None = None
+
+    def clip(self) -> np.ndarray:
+        """The frames.
+
+        Raises:
+            FileNotFoundError: the folder holds no image.
+            ValueError: the images differ in size or cannot be read.
+        """
+        if self.folder is None:
+            return draw_clip(self.frames, *self.size)
+        times_us = PERIOD_US * np.arange(len(image_paths(self.folder)))
+        return FrameFolder(self.folder, times_us).read(0, self.frames)
+
+
+def measure(job: Job) -> tuple[int, int, Cost]:
+    """Numbers of frames and events, and what a run costs beyond clip and program."""
+    simulator, clip = configured(job.name, job.threshold_log), job.clip()
+    times_us = PERIOD_US * np.arange(len(clip))
     run(simulator, clip[:4, :32, :32], times_us[:4])
     counts: list[int] = []
     cost = time_runs(lambda: counts.append(run(simulator, clip, times_us)))
-    return counts[0], cost.seconds, cost.peak_mib
+    return len(clip), counts[0], cost
 
 
 def run(simulator: simulators.Simulator, clip: np.ndarray, times_us: np.ndarray) -> int:
@@ -80,16 +112,24 @@ def run(simulator: simulators.Simulator, clip: np.ndarray, times_us: np.ndarray)
     return count + len(stream.finish())
 
 
-def print_table(frames: int, width: int, height: int, names: Sequence[str] = NAMES) -> None:
+def print_table(
+    frames: int,
+    width: int,
+    height: int,
+    names: Sequence[str] = NAMES,
+    folder: Path | None = None,
+) -> None:
     """One row per simulator and threshold."""
-    table = Table(title=f"{frames} frames of {width}x{height}")
+    drawn = f"{frames} frames of {width}x{height}"
+    table = Table(title=drawn if folder is None else f"{folder.name}, up to {frames} frames")
     for column in ("simulator", "threshold", "Mevents", "Mevents/s", "frames/s", "peak MiB"):
         table.add_column(column, justify="left" if column == "simulator" else "right")
     for name in names:
         for threshold_log in THRESHOLDS_LOG[: None if has_threshold(name) else 1]:
-            job = (name, threshold_log, (frames, height, width))
-            events, seconds, memory = in_own_process(measure, job)
-            row = (events / 1e6, events / 1e6 / seconds, frames / seconds, memory)
+            job = Job(name, threshold_log, frames, (height, width), folder)
+            length, events, cost = in_own_process(measure, job)
+            rates = (events / 1e6 / cost.seconds, length / cost.seconds)
             shown = str(threshold_log) if has_threshold(name) else "its own"
-            table.add_row(name, shown, *(f"{value:.1f}" for value in row))
+            values = (events / 1e6, *rates, cost.peak_mib)
+            table.add_row(name, shown, *(f"{value:.1f}" for value in values))
     Console().print(table)
