@@ -36,8 +36,7 @@ def chance_of_on(level: float, drift: float, spread: float, faithful: bool) -> f
         return 0.5 if faithful else 0.5 * (1.0 + level)
     if spread == 0.0:
         return 1.0 if drift > 0 else 0.0
-    scale = 2.0 * drift / (spread * spread)
-    ahead, behind = scale * (1.0 - level), scale * (1.0 + level)
+    ahead, behind = exponents(level, drift, spread)
     if behind > CERTAIN:
         return 1.0
     if ahead < -CERTAIN:
@@ -45,6 +44,22 @@ def chance_of_on(level: float, drift: float, spread: float, faithful: bool) -> f
     if drift > 0:
         return np.expm1(-behind) / np.expm1(-(ahead + behind))
     return np.exp(ahead) * np.expm1(behind) / np.expm1(ahead + behind)
+
+
+# Without a branch, and with infinite numbers in place of errors, so that loops over pixels can
+# compute several at a time; so is `inverse_gaussian`.
+@njit(cache=True, error_model="numpy")
+def exponents(level: float, drift: float, spread: float) -> tuple[float, float]:
+    """How certain a motion's drift makes its side: distances to +1 and -1 over its own length.
+
+    From `CERTAIN` on the second says that +1 comes first, below minus that the first says -1.
+
+    Example:
+        >>> exponents(0.5, 1.0, 1.0)
+        (1.0, 3.0)
+    """
+    scale = 2.0 * drift / (spread * spread)
+    return scale * (1.0 - level), scale * (1.0 + level)
 
 
 @njit(cache=True)
@@ -67,31 +82,33 @@ def passage_time(
     if towards == 0.0:
         square = max(normal(word_at(word, 1)) ** 2, _SMALLEST_SQUARE)
         return (2.0 if faithful else 1.0) * (distance / spread) ** 2 / square
-    mean = distance / abs(towards)
     if towards < 0.0 and faithful:
-        return _misdrawn_passage(mean, (distance / spread) ** 2, word)
+        return _misdrawn_passage(distance / abs(towards), (distance / spread) ** 2, word)
     size = ziggurat_normal(word_at(word, 1))
-    half = 0.5 * (size * spread) ** 2 / (distance * abs(towards))
-    return mean * stretched(half, uniform(word_at(word, 2)))
+    return inverse_gaussian(distance, abs(towards), spread, size, uniform(word_at(word, 2)))
 
 
-# Without a branch, and with infinite numbers in place of errors, so that loops over pixels can
-# compute several at a time.
 @njit(cache=True, error_model="numpy")
-def stretched(half: float, share: float) -> float:
-    """An inverse Gaussian number of mean 1: one of the two roots that a normal number gives.
+def inverse_gaussian(
+    distance: float, speed: float, spread: float, size: float, share: float
+) -> float:
+    """The time to a barrier ahead, one of the two roots that a normal number gives.
 
     Args:
-        half: half the square of the normal number, over the shape parameter.
+        distance: to the barrier.
+        speed: drift towards it.
+        spread: standard deviation per square root of a unit of time.
+        size: the normal number, of either sign.
         share: uniform number that chooses the root.
 
     Example:
-        >>> stretched(0.5, 0.0) * stretched(0.5, 0.99)
+        >>> inverse_gaussian(1.0, 1.0, 1.0, 1.0, 0.0) * inverse_gaussian(1.0, 1.0, 1.0, 1.0, 0.99)
         1.0
     """
+    half = 0.5 * (size * spread) ** 2 / (distance * speed)
     longer = 1.0 + half + math.sqrt(half * (half + 2.0))
     shorter = 1.0 / longer
-    return shorter if share * (1.0 + shorter) <= 1.0 else longer
+    return distance / speed * (shorter if share * (1.0 + shorter) <= 1.0 else longer)
 
 
 @njit(cache=True)

@@ -15,7 +15,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.simulators.ordering import Fired, event_key, with_room
-from eqs.simulators.passage import CERTAIN, chance_of_on, passage_time, stretched
+from eqs.simulators.passage import (
+    CERTAIN,
+    chance_of_on,
+    exponents,
+    inverse_gaussian,
+    passage_time,
+)
 from eqs.simulators.randomness import layered_size, mixed, uniform, word_at
 
 _RUN = 256  # pixels whose intermediate numbers stay in the nearest cache
@@ -121,12 +127,10 @@ def _move(
     """Voltages at the end of the interval; NaN for a side in doubt or a passage within."""
     for index in range(level.size):
         drift, spread = drift_and_spread(first[index], last[index], span_us, motion)
-        scale = 2.0 * drift / (spread * spread)
-        up = scale * (1.0 + level[index]) > CERTAIN
-        down = scale * (1.0 - level[index]) < -CERTAIN
+        ahead, behind = exponents(level[index], drift, spread)
+        up, down = behind > CERTAIN, ahead < -CERTAIN
         distance = 1.0 - level[index] if up else 1.0 + level[index]
-        half = 0.5 * (size[index] * spread) ** 2 / (distance * abs(drift))
-        wait_us = distance / abs(drift) * stretched(half, share[index])
+        wait_us = inverse_gaussian(distance, abs(drift), spread, size[index], share[index])
         way = distance * span_us / wait_us
         end = level[index] + way if up else level[index] - way
         moved[index] = end if (up | down) & (wait_us >= span_us) else np.nan
