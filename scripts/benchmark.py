@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from eqs.benchmarks import rvt, scoring, simulators
+from benchmarks import rvt, scoring, simulators
 
 
 def main() -> None:

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from benchmarks import plain_rvt
+from benchmarks.rvt import Job, event_tensors, histogram, labels_of, stored_window, training
 
-from eqs.benchmarks import plain_rvt
-from eqs.benchmarks.rvt import Job, event_tensors, histogram, labels_of, stored_window, training
 from eqs.models import RVTDetector
 from eqs.models.loss import detection_loss
 from eqs.models.yolox_head import anchor_grid, decode_boxes

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 import torch
-
-from eqs.benchmarks.scoring import SET_UP, Job, histograms, pair
+from benchmarks.scoring import SET_UP, Job, histograms, pair
 
 
 @pytest.mark.parametrize("what", SET_UP)

@@ -9,7 +9,7 @@ import yaml
 from eqs.data import DSECFolder, RecordingFolder, parse_size
 
 SPLITS = {"train": ["train_*"], "val": ["train_b"], "test": ["test_*"]}
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 
 
 def folder(root, **options):

@@ -85,7 +85,7 @@ def test_bad_protocols():
     ("name", "count"), [("coco", 3), ("dsec8", 8), ("dagr", 2), ("prophesee_gen1", 2)]
 )
 def test_configured_protocols(name, count):
-    path = Path(__file__).parents[2] / "configs" / "protocol" / f"{name}.yaml"
+    path = Path(__file__).parents[2] / "eqs/configs" / "protocol" / f"{name}.yaml"
     config = yaml.safe_load(path.read_text())
     del config["_target_"]
     config.update(crop_rows=None, score_empty_frames=True)  # interpolations from the data set

@@ -8,7 +8,7 @@ from hydra.utils import instantiate
 
 from eqs.metrics import Centre, Definition
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 
 
 def build(name, *overrides):

@@ -9,7 +9,7 @@ from omegaconf import OmegaConf
 
 from eqs.models import RVTDetector, reset_states
 
-CONFIGS = Path(__file__).parents[2] / "configs" / "model"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs" / "model"
 
 
 @torch.no_grad()

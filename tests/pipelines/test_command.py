@@ -14,7 +14,7 @@ import eqs
 from eqs.pipelines import register_resolvers
 from eqs.pipelines.command import explained, keys_explained
 
-CONFIGS = Path(eqs.__file__).parent.parent / "configs"
+CONFIGS = Path(eqs.__file__).parent / "configs"
 
 
 def composed(*overrides: str) -> DictConfig:

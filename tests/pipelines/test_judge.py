@@ -12,7 +12,7 @@ from eqs.metrics import Centre, Definition
 from eqs.pipelines import judge
 from eqs.pipelines.runs import Run, recipe_hash
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 ACCURACY = {"own": {}, "real": {}, "protocol": {}}
 
 

@@ -15,7 +15,7 @@ from eqs.pipelines.evaluate import short_names
 from eqs.pipelines.runs import Run, finished_runs, recipe_hash
 from eqs.pipelines.timing import PhaseTimes
 
-CONFIGS = Path(eqs.__file__).parent.parent / "configs"
+CONFIGS = Path(eqs.__file__).parent / "configs"
 
 
 def composed(*overrides: str, name: str = "train") -> DictConfig:

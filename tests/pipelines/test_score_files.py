@@ -11,7 +11,7 @@ from hydra import compose, initialize_config_dir
 
 from eqs.pipelines.score_files import score_files
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.simulate import simulate
 from eqs.simulators import V2E
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from eqs.pipelines.build import dataset
 from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import finished_runs
 
-CONFIGS = Path(eqs.__file__).parent.parent / "configs"
+CONFIGS = Path(eqs.__file__).parent / "configs"
 
 
 class Interrupted(Exception):

@@ -19,7 +19,6 @@ ORDER = [
     {"tasks"},
     {"study"},
     {"pipelines"},
-    {"benchmarks"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 MODULES = sorted(ROOT.glob("*/**/*.py"))

@@ -10,7 +10,7 @@ from PIL import Image
 from eqs.events import EventReader
 from eqs.scenes import DSECMini, Recording
 
-CONFIG = Path(__file__).parents[2] / "configs/data/dsec_mini.yaml"
+CONFIG = Path(__file__).parents[2] / "eqs/configs/data/dsec_mini.yaml"
 TINY = DSECMini(size="32x24", sequences={"train": 2, "test": 1}, frames=4, workers=1)
 
 

@@ -26,7 +26,7 @@ from eqs.simulators import (
     Vid2E,
 )
 
-CONFIGS = Path(__file__).parents[2] / "configs"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 SIMULATORS = {
     "esim": ESIM,
     "v2e": V2E,

@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.table import Table
 from torch import Tensor
 
-from eqs.benchmarks import plain_rvt
-from eqs.benchmarks.simulators import PERIOD_US, draw_clip
-from eqs.benchmarks.timing import Cost, in_own_process, time_runs
+from benchmarks import plain_rvt
+from benchmarks.simulators import PERIOD_US, draw_clip
+from benchmarks.timing import Cost, in_own_process, time_runs
 from eqs.data.histogram_cache import cached_histogram
 from eqs.events import EventReader, Events
 from eqs.models import RVTDetector
