@@ -190,6 +190,7 @@ def write_stream(
             follow(frames, count)
         rest = stream.finish()
         writer.append(rest)
+        writer.span_us = stream.span_us
     return frames, count + len(rest)
 
 

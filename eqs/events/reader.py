@@ -2,12 +2,14 @@
 
 A file holds `events/{x,y,p,t}`, the time of each event counted from the scalar `t_offset`, and
 `ms_to_idx`, whose entry k is the index of the first event at or after k milliseconds. Files written
-here also carry the sensor size as attributes `height` and `width`, which DSEC's own files lack.
+here also carry the sensor size as attributes `height` and `width` and, where it is known, the span
+that was watched as `start_us` and `stop_us`, which DSEC's own files lack.
 """
 
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -94,13 +96,23 @@ class EventReader:
         """One microsecond past the last event; the file's offset if there is none."""
         return self._opened().stop_us
 
+    @property
+    def span_us(self) -> tuple[int, int] | None:
+        """Start and stop of the time that was watched; None where the file does not say."""
+        return self._opened().span_us
+
+    @property
+    def extent_us(self) -> tuple[int, int] | None:
+        """The span or, where the file says none, that of the events; None without either."""
+        return self.span_us or ((self.start_us, self.stop_us) if len(self) else None)
+
     def __len__(self) -> int:
         """Number of events in the file."""
         return self._opened().count
 
     def read(self) -> Events:
-        """All events at once."""
-        return self.window(self.start_us, self.stop_us)
+        """All events at once, with the span that the file states."""
+        return replace(self.window(self.start_us, self.stop_us), span_us=self.span_us)
 
     def window(self, start_us: int, stop_us: int) -> Events:
         """The events with `start_us <= t < stop_us`; none where the recording has none.
@@ -115,7 +127,7 @@ class EventReader:
         try:
             first, t = file.times(start_us - file.offset_us, stop_us - file.offset_us)
             rows = slice(first, first + len(t))
-            fields = {name: as_field(name, file.columns[name][rows]) for name in "xyp"}
+            fields: dict[str, Any] = {k: as_field(k, file.columns[k][rows]) for k in "xyp"}
             events = Events(t + file.offset_us, **fields, height=file.height, width=file.width)
         except (OSError, ValueError) as error:
             raise ValueError(f"{self.path}: {error}") from error
@@ -151,6 +163,7 @@ class _Handles:
                 self.start_us += int(self.columns["t"][0])
                 self.stop_us += int(self.columns["t"][-1]) + 1
             self._check_times(path)
+            self.span_us = self._span(path)
         except BaseException as error:
             self.file.close()
             if isinstance(error, OSError):  # a chunk that cannot be read
@@ -229,6 +242,13 @@ class _Handles:
                 f"{self.stop_us - 1} us, before the first at {self.start_us} us; "
                 "sort the stream and write the file again"
             )
+
+    def _span(self, path: Path) -> tuple[int, int] | None:
+        limits = [self.file.attrs.get(name) for name in ("start_us", "stop_us")]
+        if any(limit is None for limit in limits):
+            return None
+        start, stop = (_whole_number(limit, f"the span of {path}") for limit in limits)
+        return start, stop
 
     def _side(self, path: Path, name: str, given: int | None) -> int:
         stored = self.file.attrs.get(name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +41,9 @@ class Events:
 
     Convention: `t` is int64 microseconds on the recording's own clock, windows are half-open
     `[start, stop)`, `p` is 1 where the pixel became brighter and 0 where it became darker, `x`
-    counts columns from the left and `y` rows from the top.
+    counts columns from the left and `y` rows from the top. A span says when the sensor was
+    watching: a quiet second within it is silence, one outside it is not known. Events that leave
+    the sensor late may lie behind its end.
 
     Args:
         t: time of each event, int64 microseconds, never decreasing, shape (n,).
@@ -50,10 +52,11 @@ class Events:
         p: polarity, uint8, 0 or 1, shape (n,).
         height: rows of the sensor.
         width: columns of the sensor.
+        span_us: start and stop of the time that was watched; None where nobody noted it.
 
     Raises:
         ValueError: a field has the wrong type or length, time runs backwards, a coordinate lies
-            outside the sensor, or a polarity is neither 0 nor 1.
+            outside the sensor, a polarity is neither 0 nor 1, or the span stops before it starts.
 
     Example:
         >>> events = Events.from_arrays(t=[5, 9], x=[0, 1], y=[2, 2], p=[1, 0], height=4, width=4)
@@ -67,6 +70,7 @@ class Events:
     p: NDArray[np.uint8]
     height: int
     width: int
+    span_us: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         """Check everything the rest of the package may then rely on."""
@@ -83,6 +87,11 @@ class Events:
             raise ValueError(f"Expected event fields of one length, got {lengths}")
         if len(self.t):
             self._check_values()
+        if self.span_us is not None and self.span_us[0] > self.span_us[1]:
+            raise ValueError(
+                f"Expected a span that starts before it stops, got {self.span_us[0]} to "
+                f"{self.span_us[1]} us; give the time in which the sensor was watching"
+            )
 
     def _check_values(self) -> None:
         step = np.flatnonzero(self.t[1:] < self.t[:-1])
@@ -118,7 +127,7 @@ class Events:
             ValueError: a value is not a whole number or does not fit its field.
         """
         given = {"t": t, "x": x, "y": y, "p": p}
-        fields = {name: as_field(name, np.asarray(values)) for name, values in given.items()}
+        fields: dict[str, Any] = {k: as_field(k, np.asarray(v)) for k, v in given.items()}
         return cls(**fields, height=height, width=width)
 
     @classmethod
@@ -141,7 +150,9 @@ class Events:
         if len(sizes) > 1:
             raise ValueError(f"Expected streams of one sensor size, got {sorted(sizes)}")
         joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS}
-        return cls(**joined, height=parts[0].height, width=parts[0].width)
+        first, last = parts[0].span_us, parts[-1].span_us
+        span = (first[0], last[1]) if first and last else None
+        return cls(**joined, height=parts[0].height, width=parts[0].width, span_us=span)
 
     @classmethod
     def load(cls, path: Path | str, height: int | None = None, width: int | None = None) -> Events:
@@ -157,10 +168,18 @@ class Events:
 
         with EventWriter(path, height=self.height, width=self.width) as writer:
             writer.append(self)
+            writer.span_us = self.span_us
 
     def __len__(self) -> int:
         """Number of events."""
         return len(self.t)
+
+    @property
+    def extent_us(self) -> tuple[int, int] | None:
+        """The span or, where nobody noted it, first event's time to just after the last one's."""
+        if self.span_us is None and len(self):
+            return int(self.t[0]), int(self.t[-1]) + 1
+        return self.span_us
 
     def window(self, start_us: int, stop_us: int) -> Events:
         """The events with `start_us <= t < stop_us`, as views."""
@@ -168,14 +187,17 @@ class Events:
         return self[int(first) : int(last)]
 
     def __getitem__(self, index: slice) -> Events:
-        """The events at a slice of indices, as views."""
+        """The events at a slice of indices, as views, without the span."""
         part = object.__new__(Events)  # a slice of checked events needs no second check
         for name in FIELDS:
             object.__setattr__(part, name, getattr(self, name)[index])
         object.__setattr__(part, "height", self.height)
         object.__setattr__(part, "width", self.width)
+        object.__setattr__(part, "span_us", None)
         return part
 
     def shifted(self, offset_us: int) -> Events:
         """The same stream on a clock that reads `offset_us` more."""
-        return Events(self.t + np.int64(offset_us), self.x, self.y, self.p, self.height, self.width)
+        span = self.span_us and (self.span_us[0] + offset_us, self.span_us[1] + offset_us)
+        t = self.t + np.int64(offset_us)
+        return replace(self, t=t, span_us=span)

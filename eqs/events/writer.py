@@ -53,6 +53,8 @@ class EventWriter:
         self.path = Path(path)
         self.partial_path = self.path.with_name(self.path.name + ".partial")
         self.height, self.width = height, width
+        self.span_us: tuple[int, int] | None = None
+        """Start and stop of the time that was watched, which may be set until the file is whole."""
         self._offset_us = t_offset_us
         self._index = [np.zeros(1, np.int64)]  # entries of ms_to_idx; the first is 0 by definition
         self._last_us = -1
@@ -90,6 +92,8 @@ class EventWriter:
                 index = np.concatenate(self._index).astype(np.uint64)
                 self._file.create_dataset("ms_to_idx", data=index)
                 self._file.create_dataset("t_offset", data=np.int64(self._offset_us or 0))
+                if self.span_us is not None:
+                    self._file.attrs.update(start_us=self.span_us[0], stop_us=self.span_us[1])
                 self._file.close()
                 self.partial_path.replace(self.path)
         finally:

@@ -2,23 +2,26 @@
 
 from eqs.metrics.battery import EXPECTED_ORDER, GRADED, anchors, singles
 from eqs.metrics.centre import Centre, feature_centres
-from eqs.metrics.definition import TAPS, Definition, weights_sha256
+from eqs.metrics.definition import ACTIVATIONS, Definition
 from eqs.metrics.detection import MeanAveragePrecision
-from eqs.metrics.eqs import EventQualityScore, load_backbone
+from eqs.metrics.eqs import EventQualityScore
 from eqs.metrics.features import TappedBackbone, pooled_features
+from eqs.metrics.judge import Judge, RVTShape, weights_sha256
 from eqs.metrics.pooling import pool_grid, pool_patches, smooth_grid, smooth_patches
-from eqs.metrics.scoring import Reading, StreamScore, score_group, score_streams
+from eqs.metrics.scoring import Reading, StreamScore, score_group, score_streams, score_tensors
 from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine, whitening_matrix
 from eqs.metrics.windows import group_chunks, histogram_chunks, normalised_counts, window_starts
 
 __all__ = [
+    "ACTIVATIONS",
     "EXPECTED_ORDER",
     "GRADED",
-    "TAPS",
     "Centre",
     "Definition",
     "EventQualityScore",
+    "Judge",
     "MeanAveragePrecision",
+    "RVTShape",
     "Reading",
     "StreamScore",
     "TappedBackbone",
@@ -27,7 +30,6 @@ __all__ = [
     "feature_centres",
     "group_chunks",
     "histogram_chunks",
-    "load_backbone",
     "mean_over_stages",
     "normalised_counts",
     "patch_cosine",
@@ -36,6 +38,7 @@ __all__ = [
     "pooled_features",
     "score_group",
     "score_streams",
+    "score_tensors",
     "singles",
     "smooth_grid",
     "smooth_patches",

@@ -17,7 +17,7 @@ from torch import Tensor
 from eqs.metrics.definition import Definition
 from eqs.metrics.features import TappedBackbone, pooled_features
 from eqs.metrics.similarity import whitening_matrix
-from eqs.metrics.windows import Stream, group_chunks
+from eqs.metrics.windows import StreamOrHistograms, group_chunks
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,7 +87,7 @@ class Centre:
         """
         source = Path(path)
         if not source.is_file():
-            raise FileNotFoundError(f"Expected a centre at {source}, got no file; set eqs.centre")
+            raise FileNotFoundError(f"Expected a centre at {source}, got no file; set eqs.judge")
         try:
             with source.open("rb") as file, np.load(file, allow_pickle=False) as data:
                 stages = tuple(sorted(int(key[6:]) for key in data if key.startswith("stage_")))
@@ -126,7 +126,7 @@ class Centre:
         if missing:
             raise ValueError(
                 f"Expected a centre of stages {tuple(stages)}, got one of {self.stages}; "
-                "set eqs.centre or eqs.stages"
+                "set eqs.judge or eqs.stages"
             )
         return tuple(torch.from_numpy(self.means[self.stages.index(stage)]) for stage in stages)
 
@@ -142,7 +142,7 @@ class Centre:
 
 def feature_centres(
     backbone: TappedBackbone,
-    recordings: Iterable[Stream],
+    recordings: Iterable[StreamOrHistograms],
     *,
     taps: Sequence[str],
     definition: Definition,
@@ -210,7 +210,7 @@ class _Moments:
             raise ValueError("Expected at least one real recording to centre on, got none")
         mean = (self.total / self.count).float().numpy()
         if not np.isfinite(mean).all():
-            raise ValueError("Expected finite features, got NaN or infinity; set eqs.weights")
+            raise ValueError("Expected finite features, got NaN or infinity; set eqs.judge")
         return mean
 
     def covariance(self) -> NDArray[np.float32]:

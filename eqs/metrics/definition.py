@@ -4,31 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Literal
-
-import torch
-from torch import nn
+from dataclasses import asdict, dataclass, fields
+from typing import Literal, get_args, get_origin, get_type_hints
 
 from eqs.files import short_hash
 
-TAPS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
+# The activations of a stage that can be compared.
+ACTIVATIONS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 
-KINDS = {
-    "features": ("raw", "centred", "whitened"),
-    "patch": ("cells", "grid"),
-    "pooling": ("box", "smooth"),
-    "state": ("carried", "reset"),
-    "mask": ("none", "active"),
-    "span": ("window", "events"),
-    "counts": ("raw", "normalised"),
-}
-
-FEATURE_CHOICES = (
-    "patch", "patch_size", "pooling", "state",
-    "bins", "window_us", "count_cutoff", "span", "counts",
-)  # fmt: skip
+# Choices on which the pooled features do not depend: a centre serves whatever these say.
+BESIDE_FEATURES = ("tap", "features", "stages", "mask", "warmup_windows", "architecture")
 
 # Choices that have one reading here. They are part of the hash, so that a later alternative
 # cannot be mistaken for this one.
@@ -56,7 +41,8 @@ class Definition:
     `min(warmup_windows, n // 4)`.
 
     Args:
-        tap: which activation of each stage is compared.
+        tap: which activation of each stage is compared: gate (the paper's formula), gate_logits,
+            hidden, cell, attention or downsample.
         features: compared as they are, `raw`; `centred`, minus the mean real feature; or also
             `whitened`, so that real features vary alike in every direction.
         stages: stages of the backbone, counted from 1.
@@ -100,8 +86,8 @@ class Definition:
 
     def __post_init__(self) -> None:
         """Reject what no score can be computed from."""
-        if self.tap not in TAPS:
-            raise ValueError(f"Expected a tap among {TAPS}, got {self.tap!r}; set eqs.tap")
+        if self.tap not in ACTIVATIONS:
+            raise ValueError(f"Expected a tap among {ACTIVATIONS}, got {self.tap!r}; set eqs.tap")
         if any(not isinstance(stage, int) for stage in self.stages):
             raise ValueError(
                 f"Expected stages as whole numbers, got {self.stages}; set eqs.stages=[1,2,3]"
@@ -110,7 +96,7 @@ class Definition:
             raise ValueError(
                 f"Expected stages counted from 1 in rising order, got {self.stages}; set eqs.stages"
             )
-        for name, known in KINDS.items():
+        for name, known in kinds().items():
             if getattr(self, name) not in known:
                 raise ValueError(
                     f"Expected {name} {' or '.join(known)}, got {getattr(self, name)!r}; "
@@ -134,7 +120,7 @@ class Definition:
     def features_hash(self) -> str:
         """Eight hex digits of what pooled features depend on beside the network and its tap."""
         choices = asdict(self)
-        return short_hash({name: choices[name] for name in FEATURE_CHOICES})
+        return short_hash({k: value for k, value in choices.items() if k not in BESIDE_FEATURES})
 
     @property
     def column(self) -> str:
@@ -146,24 +132,22 @@ class Definition:
         return min(self.warmup_windows, windows // 4)
 
 
-def weights_sha256(source: Path | str | nn.Module) -> str:
-    """The sha256 of a weights file, or of a module's named tensors.
+def kinds() -> dict[str, tuple[str, ...]]:
+    """The values of each choice that is one of a few words.
 
-    Convention: a module's hash covers names, shapes, types and values in the order of the names;
-    it differs from the hash of a file that holds the same weights.
-
-    Raises:
-        FileNotFoundError: there is no such file.
+    Example:
+        >>> kinds()["state"]
+        ('carried', 'reset')
     """
-    if not isinstance(source, nn.Module):
-        path = Path(source)
-        if not path.is_file():
-            raise FileNotFoundError(f"Expected weights at {path}, got no file; set eqs.weights")
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    digest = hashlib.sha256()
-    for name, tensor in sorted(source.state_dict().items()):
-        data = tensor.detach().cpu().contiguous()
-        digest.update(f"{name} {tuple(data.shape)} {data.dtype}".encode())
-        digest.update(data.reshape(-1).view(torch.uint8).numpy().tobytes())
-    return digest.hexdigest()
+    hints = get_type_hints(Definition)
+    return {name: get_args(hint) for name, hint in hints.items() if get_origin(hint) is Literal}
+
+
+def choices() -> tuple[str, ...]:
+    """Names of the choices that a user of a judge has, in the order of the definition.
+
+    Example:
+        >>> choices()[:2]
+        ('tap', 'features')
+    """
+    return tuple(field.name for field in fields(Definition) if field.name != "architecture")

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 from torchmetrics import Metric
 
-from eqs.metrics.centre import Centre
-from eqs.metrics.definition import Definition, weights_sha256
-from eqs.metrics.features import TappedBackbone
-from eqs.metrics.scoring import Reading, StreamScore, score_streams
-from eqs.metrics.windows import Stream
+from eqs.metrics.definition import Definition, choices
+from eqs.metrics.judge import Judge
+from eqs.metrics.scoring import Reading, StreamScore, Watcher, score_streams, score_tensors
+from eqs.metrics.windows import StreamOrHistograms
+
+log = logging.getLogger(__name__)
 
 
 class EventQualityScore(Metric):
@@ -34,46 +35,36 @@ class EventQualityScore(Metric):
 
     Convention: EQS is a similarity in [-1, 1], higher is better, 1 for identical streams; the
     distance is `1 - EQS`. The published text defines the distance and tabulates the similarity.
-    A stream without events is silence, scored over the extent of the other stream.
+    A stream without events is silence, scored over the extent of the real stream.
 
     Source: Chanda et al., "Event Quality Score (EQS)", CVPR Workshops 2025, arXiv 2504.12515.
 
     Args:
-        weights: checkpoint of a detector trained on real events, or "random" as a control.
-        tap: which activation is compared: gate (the paper's formula), gate_logits, hidden, cell,
-            attention or downsample.
-        centre: mean real feature: a file, a `Centre`, or one tensor per stage; for `whitened`
-            features with its covariance, so no tensors.
-        features: compared `raw`, `centred`, minus the mean real feature, or also `whitened` by
-            its covariance; None takes `centred` with a centre and `raw` without.
-        stages: stages of the backbone, counted from 1.
-        patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
-        patch_size: side of a patch in cells, or patches per side of the map.
-        pooling: `box`, the mean of a patch's cells, or `smooth`, weights that fall off into the
-            neighbouring patches.
-        state: `carried` from window to window, or `reset` to zero before each.
-        mask: `none`, or `active`: only patches in which either stream has events count.
-        bins: time bins per window and polarity.
-        window_us: length of a window in microseconds.
-        count_cutoff: events per pixel and bin at which the histogram saturates.
-        span: time the bins cover, the whole `window` or first to last of its `events`.
-        counts: `raw`, or `normalised`: each window is scaled to one mean count.
-        warmup_windows: most windows dropped at the start; never more than a quarter of a stream.
-        size: size of the RVT backbone.
-        partition_split_32: attention windows per side of the backbone's last stage.
-        seed: seed of the random weights.
-        backbone: any network with `taps`, instead of weights.
+        judge: what scores: a folder with `judge.json`, as `train.py sim=real` leaves it; the
+            checkpoint of a detector trained on real events, whose scores are raw; "random", a
+            control; or a `Judge`.
+        partition_split_32: of a bare checkpoint, where it is not 2; a folder knows its own.
         chunk_windows: windows per pass; chosen from the sensor size if None. It changes memory
             and speed, not the score.
-        **kwargs: passed on to `torchmetrics.Metric`.
+        **others: any choice of `Definition`, by its name, None for what the judge says; the rest
+            is passed on to `torchmetrics.Metric`.
 
     Raises:
-        FileNotFoundError: the weights or the centre are no file.
-        ValueError: a choice is out of range, or weights, backbone and centre do not fit together.
+        FileNotFoundError: there is no such judge.
+        ValueError: a choice is out of range, unknown, or does not fit the judge.
+
+    Example:
+        >>> from eqs.events import Events
+        >>> events = Events.from_arrays([0, 60_000, 99_999], [1, 5, 9], [2, 2, 2], [1, 0, 1],
+        ...                             height=32, width=32)
+        >>> score = EventQualityScore("random", features="raw")
+        >>> score.update(events, events)
+        >>> round(float(score.compute()), 4)
+        1.0
     """
 
     higher_is_better = True
-    is_differentiable = False
+    is_differentiable = False  # `update` and `compute` are not; `loss` is
     full_state_update = False
     plot_lower_bound = -1.0
     plot_upper_bound = 1.0
@@ -83,66 +74,29 @@ class EventQualityScore(Metric):
 
     def __init__(
         self,
-        weights: Path | str | None = None,
+        judge: Judge | Path | str,
         *,
-        tap: str = "hidden",
-        centre: Centre | Path | str | Sequence[Tensor] | None = None,
-        features: Literal["raw", "centred", "whitened"] | None = None,
-        stages: Sequence[int] = (1, 2, 3),
-        patch: Literal["cells", "grid"] = "cells",
-        patch_size: int = 3,
-        pooling: Literal["box", "smooth"] = "box",
-        state: Literal["carried", "reset"] = "carried",
-        mask: Literal["none", "active"] = "none",
-        bins: int = 10,
-        window_us: int = 50_000,
-        count_cutoff: int = 10,
-        span: Literal["window", "events"] = "window",
-        counts: Literal["raw", "normalised"] = "raw",
-        warmup_windows: int = 20,
-        size: str = "small",
-        partition_split_32: int = 2,
-        seed: int = 0,
-        backbone: TappedBackbone | None = None,
+        partition_split_32: int | None = None,
         chunk_windows: int | None = None,
-        **kwargs: object,
+        **others: Any,  # noqa: ANN401
     ) -> None:
         """Load the judge and check that everything fits."""
-        super().__init__(**kwargs)
-        if (weights is None) == (backbone is None):
-            raise ValueError(
-                "Expected either weights or a backbone, got "
-                f"{'neither' if weights is None else 'both'}; set eqs.weights to a checkpoint "
-                'trained on real events, or to "random"'
+        chosen = {name: others.pop(name) for name in choices() if name in others}
+        super().__init__(**others)
+        if not isinstance(judge, Judge):
+            judge = Judge.load(judge, partition_split_32)
+        given = {name: value for name, value in chosen.items() if value is not None}
+        self.judge = judge
+        self.reading = judge.reading(**given)
+        if "features" not in given and not judge.centres:
+            log.warning(
+                "The judge (%s) has no centre: its scores are raw, and raw scores hardly tell one "
+                "stream from another; give it one with Judge.centred_on",
+                judge.description,
             )
-        definition = Definition(
-            tap=tap,
-            features=features or ("raw" if centre is None else "centred"),
-            stages=tuple(stages),
-            patch=patch,
-            patch_size=patch_size,
-            pooling=pooling,
-            state=state,
-            mask=mask,
-            bins=bins,
-            window_us=window_us,
-            count_cutoff=count_cutoff,
-            span=span,
-            counts=counts,
-            warmup_windows=warmup_windows,
-            architecture=f"rvt-{size}-split{partition_split_32}"
-            if backbone is None
-            else type(backbone).__name__,
-        )
-        self.reading = Reading(definition=definition, centre=_as_centre(centre, tap, stages))
         self.chunk_windows = chunk_windows
         self.last: StreamScore | None = None
-        self.weights_sha256: str | None = None
-        if backbone is None:
-            backbone, self.weights_sha256 = load_backbone(
-                str(weights), size=size, bins=bins, partition_split_32=partition_split_32, seed=seed
-            )
-        self.backbone = backbone
+        self.backbone = judge.backbone
         self.add_state("total", torch.zeros((), dtype=torch.float64), dist_reduce_fx="sum")
         self.add_state("sequences", torch.zeros((), dtype=torch.int64), dist_reduce_fx="sum")
 
@@ -157,14 +111,58 @@ class EventQualityScore(Metric):
         return self.definition.hash
 
     @property
+    def weights_sha256(self) -> str:
+        """Hash of the judge's weights."""
+        return self.judge.weights_sha256
+
+    @property
     def centre_sha256(self) -> str | None:
         """Hash of the centre, or None for a raw score."""
         return self.reading.centre.sha256 if self.reading.centre else None
 
+    def score(
+        self,
+        real: StreamOrHistograms,
+        candidates: Sequence[StreamOrHistograms],
+        readings: Sequence[Reading] = (),
+        *,
+        start_us: int | None = None,
+        stop_us: int | None = None,
+        watch: Watcher | None = None,
+    ) -> list[dict[str, StreamScore]]:
+        """Score several streams against one, which runs through the judge once; nothing is kept.
+
+        Args:
+            real: stream of the real sensor.
+            candidates: streams of the same kind, sensor and clock.
+            readings: what to read, if not this metric's own reading alone; they may differ in tap
+                and features.
+            start_us: start of the first window; by default see `window_starts`.
+            stop_us: time that no window may pass; by default see `window_starts`.
+            watch: sees the features of every window that counts.
+
+        Returns:
+            For each candidate the scores by name of the reading.
+
+        Raises:
+            ValueError: as for `update`.
+        """
+        return score_streams(
+            self.backbone,
+            real,
+            candidates,
+            readings or [self.reading],
+            start_us=start_us,
+            stop_us=stop_us,
+            chunk_windows=self.chunk_windows,
+            watch=watch,
+            device=self.judge.device,
+        )
+
     def update(
         self,
-        simulated: Stream,
-        real: Stream,
+        simulated: StreamOrHistograms,
+        real: StreamOrHistograms,
         start_us: int | None = None,
         stop_us: int | None = None,
     ) -> None:
@@ -173,26 +171,15 @@ class EventQualityScore(Metric):
         Args:
             simulated: event stream, or histograms of shape (windows, 2 * bins, height, width).
             real: stream of the same kind, sensor and clock.
-            start_us: start of the first window; by default where both streams have begun.
-            stop_us: time that no window may pass; by default where the first stream ends.
+            start_us: start of the first window; by default see `window_starts`.
+            stop_us: time that no window may pass; by default see `window_starts`.
 
         Raises:
             ValueError: the sensors or shapes differ, the streams do not share a whole window, a
                 histogram or a feature is not finite.
         """
-        ((self.last,),) = (
-            scores.values()
-            for scores in score_streams(
-                self.backbone,
-                real,
-                [simulated],
-                [self.reading],
-                start_us=start_us,
-                stop_us=stop_us,
-                chunk_windows=self.chunk_windows,
-                device=self.device,
-            )
-        )
+        (scores,) = self.score(real, [simulated], start_us=start_us, stop_us=stop_us)
+        self.last = scores[self.reading.name]
         self.total += self.last.score
         self.sequences += 1
 
@@ -206,70 +193,22 @@ class EventQualityScore(Metric):
             raise ValueError("Expected at least one update before compute, got none")
         return self.total / self.sequences
 
+    def loss(self, simulated: Tensor, real: Tensor) -> Tensor:
+        """The distance `1 - EQS` of one sequence with gradients; the metric's state stays as it is.
+
+        Args:
+            simulated: float histograms, as of `soft_histogram`, shape (windows, 2 * bins, height,
+                width).
+            real: histograms of the same shape.
+
+        Raises:
+            ValueError: the shapes differ, or a histogram or a feature is not finite.
+        """
+        return 1.0 - score_tensors(
+            self.backbone, real, simulated, self.reading, device=self.judge.device
+        )
+
     def reset(self) -> None:
         """Forget all sequences."""
         super().reset()
         self.last = None
-
-
-def load_backbone(
-    weights: Path | str,
-    *,
-    size: str = "small",
-    bins: int = 10,
-    partition_split_32: int = 2,
-    seed: int = 0,
-) -> tuple[TappedBackbone, str]:
-    """The backbone of a detector checkpoint, or one with seeded random weights.
-
-    Args:
-        weights: path of a checkpoint, or "random".
-        size: size of the backbone.
-        bins: time bins per polarity, hence half the input channels.
-        partition_split_32: attention windows per side of the last stage.
-        seed: seed of the random weights.
-
-    Returns:
-        The backbone, frozen in evaluation mode, and the sha256 of its weights.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the weights do not fit.
-    """
-    from eqs.models import RVTDetector
-
-    if weights == "random":
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            model = RVTDetector(
-                size=size, in_channels=2 * bins, partition_split_32=partition_split_32
-            )
-        digest = weights_sha256(model.backbone)
-    else:
-        digest = weights_sha256(weights)
-        model = RVTDetector.from_checkpoint(weights, partition_split_32=partition_split_32)
-        _check_fit(model.size, size, "size")
-        _check_fit(model.backbone.in_channels, 2 * bins, "bins")
-    return model.backbone.eval().requires_grad_(False), digest
-
-
-def _check_fit(found: str | int, wanted: str | int, key: str) -> None:
-    if found != wanted:
-        what = "a backbone of size" if key == "size" else "weights for input channels"
-        raise ValueError(f"Expected {what} {wanted}, got {found}; set eqs.{key} or eqs.weights")
-
-
-def _as_centre(
-    centre: Centre | Path | str | Sequence[Tensor] | None, tap: str, stages: Sequence[int]
-) -> Centre | None:
-    if centre is None or isinstance(centre, Centre):
-        return centre
-    if isinstance(centre, str | Path):
-        return Centre.load(centre)
-    if len(centre) != len(stages):
-        raise ValueError(
-            f"Expected a centre for each of the stages {tuple(stages)}, got {len(centre)}; "
-            "set eqs.centre"
-        )
-    means = tuple(np.asarray(torch.as_tensor(mean).cpu(), dtype=np.float32) for mean in centre)
-    return Centre(tap=tap, stages=tuple(stages), means=means)

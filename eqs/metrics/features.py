@@ -25,7 +25,7 @@ POOLS = {
 }
 
 # Whatever a backbone carries from one window to the next; only the backbone looks inside.
-States = Any
+BackboneState = Any
 
 
 class TappedBackbone(Protocol):
@@ -43,8 +43,8 @@ class TappedBackbone(Protocol):
     """
 
     def taps(
-        self, x: Tensor, states: States, *, stages: Sequence[int], names: Sequence[str]
-    ) -> tuple[dict[str, list[Tensor]], States]:
+        self, x: Tensor, states: BackboneState, *, stages: Sequence[int], names: Sequence[str]
+    ) -> tuple[dict[str, list[Tensor]], BackboneState]:
         """Maps by name and stage, and the state after the last window."""
 
 
@@ -65,6 +65,7 @@ def pooled_features(
     taps: Sequence[str],
     definition: Definition,
     device: torch.device | str = "cpu",
+    gradients: bool = False,
 ) -> Iterator[dict[str, list[Tensor]]]:
     """Run streams side by side through the backbone and pool its maps.
 
@@ -77,6 +78,7 @@ def pooled_features(
         taps: activations to pool.
         definition: stages, patches, counts and state.
         device: where the backbone lives.
+        gradients: keep what the gradients of the features with respect to the chunks need.
 
     Yields:
         For each chunk, by tap a list by stage of shape (windows, streams, channels, patch rows,
@@ -89,10 +91,10 @@ def pooled_features(
     stages, side = definition.stages, definition.patch_size
     pool = POOLS[definition.patch, definition.pooling]
     strides = strides_of(backbone, stages)
-    states: States = None
+    states: BackboneState = None
     for chunk in chunks:
         (windows, streams), (height, width) = chunk.shape[:2], chunk.shape[-2:]
-        with _evaluation(backbone), torch.no_grad(), _full_precision(device):
+        with _evaluation(backbone), torch.set_grad_enabled(gradients), _full_precision(device):
             counts = x = chunk.to(device=device, dtype=torch.float32)
             if definition.counts == "normalised":
                 x = normalised_counts(counts, definition)

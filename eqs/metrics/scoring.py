@@ -14,7 +14,7 @@ from eqs.metrics.centre import Centre
 from eqs.metrics.definition import Definition
 from eqs.metrics.features import ACTIVE, TappedBackbone, pooled_features, strides_of
 from eqs.metrics.similarity import combine_maps, patch_cosine
-from eqs.metrics.windows import Stream, group_chunks
+from eqs.metrics.windows import StreamOrHistograms, group_chunks
 
 Watcher = Callable[[Mapping[str, Sequence[Tensor]]], None]
 """Sees the pooled features of every window that counts: by tap and stage a map of shape
@@ -75,12 +75,12 @@ class Reading:
             wanted, got = ("a", "none") if self.centre is None else ("no", "one")
             raise ValueError(
                 f"Expected {wanted} centre for {self.definition.features} features, got {got}; "
-                "set eqs.centre or eqs.features"
+                "set eqs.judge or eqs.features"
             )
         if self.centre is not None and self.centre.tap != self.definition.tap:
             raise ValueError(
                 f"Expected a centre of tap {self.definition.tap}, got one of {self.centre.tap}; "
-                "set eqs.centre or eqs.tap"
+                "set eqs.judge or eqs.tap"
             )
         if self.centre is not None and self.centre.features_hash not in (
             "",
@@ -88,7 +88,7 @@ class Reading:
         ):
             raise ValueError(
                 "Expected a centre of features pooled and binned as these are, got one of others; "
-                "set eqs.centre, or the keys from eqs.patch to eqs.state as when it was computed"
+                "set eqs.judge, or the keys from eqs.patch to eqs.state as when it was computed"
             )
         whitened = self.definition.features == "whitened"
         if whitened and self.centre is not None and not self.centre.covariances:
@@ -159,8 +159,8 @@ def score_group(
 
 def score_streams(
     backbone: TappedBackbone,
-    reference: Stream,
-    candidates: Sequence[Stream],
+    reference: StreamOrHistograms,
+    candidates: Sequence[StreamOrHistograms],
     readings: Sequence[Reading],
     *,
     start_us: int | None = None,
@@ -198,6 +198,42 @@ def score_streams(
     return score_group(backbone, chunks, windows, readings, watch=watch, device=device)
 
 
+def score_tensors(
+    backbone: TappedBackbone,
+    reference: Tensor,
+    candidate: Tensor,
+    reading: Reading,
+    *,
+    device: torch.device | str = "cpu",
+) -> Tensor:
+    """The score of one candidate's histograms, with gradients with respect to both.
+
+    Args:
+        backbone: the judge's network, frozen or not.
+        reference: histograms, shape (windows, 2 * bins, height, width).
+        candidate: histograms of the same shape.
+        reading: what is compared and how.
+        device: where the backbone lives.
+
+    Returns:
+        The score, a scalar.
+
+    Raises:
+        ValueError: the shapes differ, or a histogram or a feature is not finite.
+    """
+    definition = reading.definition
+    chunks, windows = group_chunks([reference, candidate], definition)
+    curves = []
+    for pooled in pooled_features(
+        backbone, chunks, taps=[definition.tap], definition=definition, device=device,
+        gradients=True,
+    ):  # fmt: skip
+        cosines = _Comparison(reading).cosines(pooled)
+        curves.append(torch.stack([_mean_over_patches(*each) for each in cosines], dim=-1)[:, 0])
+    counting = torch.cat(curves)[definition.warmup_of(windows) :]
+    return counting.nanmean(dim=0).nan_to_num(nan=1.0).mean()
+
+
 def _shared_pass(readings: Sequence[Reading]) -> Definition:
     """The choices that all readings share, or an error where they do not."""
     shared = {
@@ -212,18 +248,54 @@ def _shared_pass(readings: Sequence[Reading]) -> Definition:
     return readings[0].definition
 
 
-class _Tally:
-    """Running sums of one reading over the chunks of a group of streams."""
+class _Comparison:
+    """Compares pooled features as one reading says."""
 
-    def __init__(self, reading: Reading, warmup: int, strides: Sequence[int]) -> None:
+    def __init__(self, reading: Reading) -> None:
         self.definition = reading.definition
-        self.warmup, self.strides = warmup, strides
-        self.nothing: list[Tensor | None] = [None] * len(strides)
+        self.nothing: list[Tensor | None] = [None] * len(self.definition.stages)
         self.centres = self.whitenings = self.nothing
         if reading.centre is not None:
             self.centres = [*reading.centre.for_stages(self.definition.stages)]
             if self.definition.features == "whitened":
                 self.whitenings = [*reading.centre.whitening(self.definition.stages)]
+
+    def cosines(self, pooled: Mapping[str, Sequence[Tensor]]) -> list[tuple[Tensor, Tensor]]:
+        """By stage each patch's cosine, and 1 where it counts.
+
+        Args:
+            pooled: by tap and stage (windows, streams, channels, rows, columns), the reference
+                first.
+
+        Returns:
+            Both of shape (windows, candidates, rows, columns).
+        """
+        found = []
+        maps, masks = pooled[self.definition.tap], pooled.get(ACTIVE, self.nothing)
+        stages = zip(maps, masks, self.centres, self.whitenings, strict=True)
+        for stage, active, centre, whitening in stages:
+            cosine = patch_cosine(stage[:, 1:], stage[:, :1], centre, whitening).double()
+            if not torch.isfinite(cosine).all():
+                raise ValueError(
+                    "Expected finite features, got NaN or infinity; set eqs.judge to a sound one"
+                )
+            counts = torch.ones_like(cosine)
+            if active is not None:
+                counts = (active[:, 1:, 0] | active[:, :1, 0]).double()
+            found.append((cosine, counts))
+        return found
+
+
+def _mean_over_patches(cosine: Tensor, counts: Tensor) -> Tensor:
+    return (cosine * counts).sum(dim=(-2, -1)) / counts.sum(dim=(-2, -1))
+
+
+class _Tally:
+    """Running sums of one reading over the chunks of a group of streams."""
+
+    def __init__(self, reading: Reading, warmup: int, strides: Sequence[int]) -> None:
+        self.comparison, self.definition = _Comparison(reading), reading.definition
+        self.warmup, self.strides = warmup, strides
         self.curves: list[Tensor] = []
         self.sums: list[Tensor] = []
         """By stage, for every patch, the summed cosines and the number of windows that count."""
@@ -233,22 +305,13 @@ class _Tally:
 
         The chunk's first `skip` windows are warm-up and only show in the curve.
         """
-        curves, sums = [], []
-        maps, masks = pooled[self.definition.tap], pooled.get(ACTIVE, self.nothing)
-        stages = zip(maps, masks, self.centres, self.whitenings, strict=True)
-        for stage, active, centre, whitening in stages:
-            cosine = patch_cosine(stage[:, 1:], stage[:, :1], centre, whitening).double()
-            if not torch.isfinite(cosine).all():
-                raise ValueError(
-                    "Expected finite features, got NaN or infinity; set eqs.weights to a sound "
-                    "checkpoint"
-                )
-            counts = torch.ones_like(cosine)
-            if active is not None:
-                counts = (active[:, 1:, 0] | active[:, :1, 0]).double()
-            curves.append((cosine * counts).sum(dim=(-2, -1)) / counts.sum(dim=(-2, -1)))
-            sums.append(torch.stack([cosine * counts, counts])[:, skip:].sum(dim=1).cpu())
-        self.curves.append(torch.stack(curves, dim=-1).cpu())
+        cosines = self.comparison.cosines(pooled)
+        curve = torch.stack([_mean_over_patches(*each) for each in cosines], dim=-1)
+        self.curves.append(curve.cpu())
+        sums = [
+            torch.stack([cosine * counts, counts])[:, skip:].sum(dim=1).cpu()
+            for cosine, counts in cosines
+        ]
         before = self.sums or [torch.zeros_like(stage) for stage in sums]
         self.sums = [a + b for a, b in zip(before, sums, strict=True)]
 

@@ -23,20 +23,11 @@ EVENTS_PER_PIXEL_AND_SECOND = 35.0
 
 
 # A stream in memory or in a file, or its histograms (windows, 2 * bins, height, width).
-EventSource = Events | EventReader
-Stream = EventSource | Tensor
+EventStream = Events | EventReader
+StreamOrHistograms = EventStream | Tensor
 
 
-def extent_us(stream: EventSource) -> tuple[int, int] | None:
-    """First event's time and the time just after the last event; None without events."""
-    if not len(stream):
-        return None
-    if isinstance(stream, Events):
-        return int(stream.t[0]), int(stream.t[-1]) + 1
-    return stream.start_us, stream.stop_us
-
-
-def check_sensors(streams: Sequence[EventSource]) -> None:
+def check_sensors(streams: Sequence[EventStream]) -> None:
     """Refuse streams of different sensors.
 
     Raises:
@@ -51,34 +42,43 @@ def check_sensors(streams: Sequence[EventSource]) -> None:
 
 
 def window_starts(
-    streams: Sequence[EventSource],
+    streams: Sequence[EventStream],
     window_us: int,
     start_us: int | None = None,
     stop_us: int | None = None,
 ) -> NDArray[np.int64]:
-    """Start times of the consecutive full windows that all streams share.
+    """Start times of the consecutive full windows in which streams are compared.
 
-    Convention: without explicit limits the windows begin at the latest first event and end at the
-    earliest last event. A stream without events has no extent and sets no limit; it is scored as
-    silence over the extent of the others. A remainder shorter than a window is dropped.
+    Convention: the reference sets the limits, with its span or else its first and last event, and a
+    candidate narrows them only where it states a span of its own. So a simulator that fires late,
+    or not at all, is scored as silent for so long and not over what is left. Where the reference
+    has neither span nor events the candidates' events set the limits. A remainder shorter than a
+    window is dropped.
 
     Args:
-        streams: streams on one clock.
+        streams: streams on one clock, the reference first.
         window_us: length of a window in microseconds.
-        start_us: start of the first window.
-        stop_us: time that no window may pass.
+        start_us: start of the first window, instead of the limits.
+        stop_us: time that no window may pass, instead of the limits.
 
     Raises:
         ValueError: the streams do not overlap in time, the overlap is shorter than one window, or
             no stream has events and a limit is missing.
     """
-    extents = [extent for extent in map(extent_us, streams) if extent is not None]
+    reference, *candidates = streams
+    stated = [reference.extent_us, *(stream.span_us for stream in candidates)]
+    extents = [extent for extent in stated if extent is not None]
+    extents = extents or [each.extent_us for each in candidates if each.extent_us is not None]
     if not extents and (start_us is None or stop_us is None):
         raise ValueError(
             "Expected events in at least one stream, got none; give start_us and stop_us"
         )
     start = max(first for first, _ in extents) if start_us is None else start_us
     stop = min(last for _, last in extents) if stop_us is None else stop_us
+    if start_us is None and stop_us is None:  # who names neither relies on a common clock
+        for first, last in filter(None, (each.extent_us for each in candidates)):
+            if first >= stop or last <= start:
+                start, stop = max(start, first), min(stop, last)
     if stop <= start:
         raise ValueError(
             f"Expected streams that overlap in time, got a common stretch from {start} us to "
@@ -99,7 +99,7 @@ def chunk_length(streams: int, height: int, width: int) -> int:
 
 
 def group_chunks(
-    streams: Sequence[Stream],
+    streams: Sequence[StreamOrHistograms],
     definition: Definition,
     *,
     start_us: int | None = None,
@@ -157,7 +157,7 @@ def _tensor_chunks(tensors: Sequence[Tensor], chunk_windows: int | None) -> Iter
 
 
 def histogram_chunks(
-    streams: Sequence[EventSource],
+    streams: Sequence[EventStream],
     starts_us: NDArray[np.int64],
     definition: Definition,
     chunk_windows: int | None = None,
@@ -213,7 +213,7 @@ def normalised_counts(histograms: Tensor, definition: Definition) -> Tensor:
     return scaled.clamp_max(definition.count_cutoff)
 
 
-def _histogram(stream: EventSource, start_us: int, definition: Definition) -> NDArray[np.uint8]:
+def _histogram(stream: EventStream, start_us: int, definition: Definition) -> NDArray[np.uint8]:
     stop_us = start_us + definition.window_us
     return stacked_histogram(
         stream.window(start_us, stop_us),

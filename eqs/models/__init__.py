@@ -1,7 +1,7 @@
 """RVT detectors: backbone, pyramid, head, loss, postprocessing, checkpoints."""
 
 from eqs.models.backbone import TAPS, RVTBackbone
-from eqs.models.detector import SIZES, RVTDetector
+from eqs.models.detector import SIZES, RVTDetector, backbone_from_checkpoint
 from eqs.models.loss import detection_loss
 from eqs.models.postprocess import Detections, postprocess
 from eqs.models.states import States, detach_states, gather_frames, reset_states
@@ -15,6 +15,7 @@ __all__ = [
     "RVTDetector",
     "States",
     "SyncBatchNorm",
+    "backbone_from_checkpoint",
     "detach_states",
     "detection_loss",
     "gather_frames",

@@ -13,7 +13,7 @@ STEM = "backbone.stages.0.downsample_cf2cl.conv.weight"
 CLASS_BIAS = "yolox_head.cls_preds.0.bias"
 CLASS_LAYERS = "yolox_head.cls_preds."
 LISTED = 5
-KEYS = "model.weights or eqs.weights"
+KEYS = "model.weights"
 RESUMED = {"state_dict", "optimizer_states", "lr_schedulers", "pytorch-lightning_version"}
 
 
@@ -105,7 +105,7 @@ def load_weights(model: nn.Module, path: str | Path, *, new_class_branch: bool =
             )
         anew = {name: x for name, x in own.items() if name.startswith(CLASS_LAYERS)}
         weights = {**weights, **anew}
-    _check_entries(own, weights, path)
+    check_entries(own, weights, path)
     model.load_state_dict(weights)
 
 
@@ -125,7 +125,7 @@ def check_resumable(model: nn.Module, path: str | Path) -> None:
             f"Expected a training of {classes} classes to resume, got {stored} in {path}; set "
             "ckpt_path to another, or model.weights to it with model.new_class_branch=true"
         )
-    _check_entries(model.state_dict(), weights, path)
+    check_entries(model.state_dict(), weights, path)
     missing = sorted(RESUMED - content.keys())
     if missing:
         raise ValueError(
@@ -134,7 +134,23 @@ def check_resumable(model: nn.Module, path: str | Path) -> None:
         )
 
 
-def _check_entries(own: dict[str, Tensor], weights: dict[str, Tensor], path: str | Path) -> None:
+def check_entries(
+    own: dict[str, Tensor],
+    weights: dict[str, Tensor],
+    path: str | Path,
+    keys: str = "model.size and model.in_channels to the checkpoint's",
+) -> None:
+    """Refuse weights that are not those of a module, entry for entry.
+
+    Args:
+        own: the module's own entries.
+        weights: those of the file.
+        path: the file.
+        keys: what to set in the error's words.
+
+    Raises:
+        ValueError: missing, unexpected or differently shaped entries.
+    """
     problems = {
         "missing": [name for name in own if name not in weights],
         "unexpected": [name for name in weights if name not in own],
@@ -147,8 +163,7 @@ def _check_entries(own: dict[str, Tensor], weights: dict[str, Tensor], path: str
     if any(problems.values()):
         found = "; ".join(f"{kind}: {_shortened(names)}" for kind, names in problems.items())
         raise ValueError(
-            f"Expected the {len(own)} entries of this detector in {path}, got {found}; set "
-            "model.size and model.in_channels to the checkpoint's"
+            f"Expected the {len(own)} entries of this network in {path}, got {found}; set {keys}"
         )
 
 

@@ -11,7 +11,13 @@ from torch import Tensor, nn
 
 from eqs.models.attention import LAYER_SCALE_INIT, LayerScale
 from eqs.models.backbone import RVTBackbone
-from eqs.models.checkpoint import load_weights, read_weights, shape_of
+from eqs.models.checkpoint import (
+    STEM,
+    check_entries,
+    load_weights,
+    read_weights,
+    shape_of,
+)
 from eqs.models.fpn import PAFPN
 from eqs.models.loss import detection_loss
 from eqs.models.lstm import ConvLSTM
@@ -80,10 +86,7 @@ class RVTDetector(nn.Module):
         """Build the network, then load `weights` if there are any."""
         super().__init__()
         if size not in SIZES:
-            raise ValueError(
-                f"Expected one of {', '.join(SIZES)}, got {size!r}; "
-                "set model.size, or eqs.size of a judge"
-            )
+            raise ValueError(f"Expected one of {', '.join(SIZES)}, got {size!r}; set model.size")
         if min(num_classes, in_channels, partition_split_32) < 1:
             raise ValueError(
                 "Expected positive num_classes, in_channels and partition_split_32, got "
@@ -130,14 +133,8 @@ class RVTDetector(nn.Module):
                 number of classes.
         """
         found = shape_of(read_weights(path), path)
-        sizes = {shape.embed_dim: size for size, shape in SIZES.items()}
-        if found.embed_dim not in sizes:
-            raise ValueError(
-                f"Expected a detector of embedding width {', '.join(map(str, sizes))}, got "
-                f"{found.embed_dim} in {path}"
-            )
         return cls(
-            sizes[found.embed_dim],
+            size_of_width(found.embed_dim, path),
             num_classes=found.num_classes if num_classes is None else num_classes,
             in_channels=found.in_channels,
             partition_split_32=partition_split_32,
@@ -199,3 +196,45 @@ class RVTDetector(nn.Module):
 
     def _head(self, features: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
         return self.yolox_head(self.fpn(features[-3:]))
+
+
+def size_of_width(embed_dim: int, path: str | Path) -> str:
+    """The published size with this embedding width.
+
+    Raises:
+        ValueError: there is none.
+    """
+    sizes = {shape.embed_dim: size for size, shape in SIZES.items()}
+    if embed_dim not in sizes:
+        raise ValueError(
+            f"Expected a detector of embedding width {', '.join(map(str, sizes))}, got "
+            f"{embed_dim} in {path}"
+        )
+    return sizes[embed_dim]
+
+
+def backbone_from_checkpoint(
+    path: str | Path, partition_split_32: int = 2
+) -> tuple[RVTBackbone, str]:
+    """The backbone alone, loaded strictly, and its size.
+
+    Args:
+        path: checkpoint of a detector, or of a backbone under the detector's names.
+        partition_split_32: as in the constructor; no checkpoint stores it.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: not a backbone of a known size, missing or unexpected entries.
+    """
+    stem = "backbone."
+    weights = {
+        name.removeprefix(stem): x
+        for name, x in read_weights(path, "eqs.judge").items()
+        if name.startswith(stem)
+    }
+    embed_dim, in_channels = weights[STEM.removeprefix(stem)].shape[:2]
+    size = size_of_width(embed_dim, path)
+    backbone = RVTBackbone(in_channels, embed_dim, SIZES[size].head_dim, partition_split_32)
+    check_entries(backbone.state_dict(), weights, path, "eqs.judge to another file")
+    backbone.load_state_dict(weights)
+    return backbone, size

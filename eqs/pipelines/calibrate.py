@@ -19,11 +19,10 @@ from scipy import optimize
 from eqs.data import Recording, overlap_us
 from eqs.events import EventReader, Events
 from eqs.frames import FrameFolder
-from eqs.metrics import score_streams
 from eqs.metrics.baselines import baselines
 from eqs.pipelines.build import dataset
 from eqs.pipelines.command import explained
-from eqs.pipelines.judge import Judge, find_judge
+from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.simulators import Simulator
 from eqs.study import calibration_table, print_calibration, write_table
 
@@ -44,14 +43,14 @@ class Search:
     """Scores a simulator on a few recordings and remembers every try.
 
     Args:
-        judge: what scores.
+        scoring: what scores.
         simulator: where the search starts.
         ranges: what may change.
         clips: the recordings to tune on.
         tried: values and scores so far.
     """
 
-    judge: Judge
+    scoring: Scoring
     simulator: Simulator
     ranges: Sequence[Range]
     clips: Sequence[Clip]
@@ -72,7 +71,7 @@ class Search:
     def miss(self, logs: NDArray[np.float64]) -> float:
         """One minus the mean score, which the search makes small."""
         candidate = self.at(logs)
-        score = float(np.mean([clip.score(self.judge, candidate) for clip in self.clips]))
+        score = float(np.mean([clip.score(self.scoring, candidate) for clip in self.clips]))
         values = {e.parameters[0]: getattr(candidate, e.parameters[0]) for e in self.ranges}
         self.tried.append({**values, "eqs": score})
         return 1.0 - score
@@ -105,35 +104,30 @@ class Clip:
         """What a simulator makes of the frames."""
         return simulator.simulate(self.frames, self.times_us, self.name)
 
-    def score(self, judge: Judge, simulator: Simulator) -> float:
+    def score(self, scoring: Scoring, simulator: Simulator) -> float:
         """Headline score of a simulator."""
-        return self.score_events(judge, self.simulated(simulator))
+        return self.score_events(scoring, self.simulated(simulator))
 
-    def score_events(self, judge: Judge, events: Events) -> float:
+    def score_events(self, scoring: Scoring, events: Events) -> float:
         """Headline score of what a simulator made."""
-        (found,) = score_streams(
-            judge.backbone,
-            self.real,
-            [events],
-            [judge.headline],
-            start_us=self.start_us,
-            stop_us=self.stop_us,
+        (found,) = scoring.metric.score(
+            self.real, [events], start_us=self.start_us, stop_us=self.stop_us
         )
-        return found[judge.headline.name].score
+        return found[scoring.headline.name].score
 
-    def measures(self, judge: Judge, simulator: Simulator) -> dict[str, float]:
+    def measures(self, scoring: Scoring, simulator: Simulator) -> dict[str, float]:
         """The score, the rate and every baseline."""
         events = self.simulated(simulator)
         values = baselines(
             events,
             self.real,
-            judge.headline.definition,
+            scoring.headline.definition,
             start_us=self.start_us,
             stop_us=self.stop_us,
             frame_times_us=self.times_us,
         )
         ratio = len(events) / max(len(self.real), 1)
-        return {"eqs": self.score_events(judge, events), "events_per_real_event": ratio, **values}
+        return {"eqs": self.score_events(scoring, events), "events_per_real_event": ratio, **values}
 
 
 @explained
@@ -149,16 +143,16 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     simulator, ranges = instantiate(cfg.sim), free_ranges(cfg.search)
     check(simulator, ranges)
     data = dataset(cfg)
-    judge = find_judge(cfg, data)
+    scoring = find_scoring(cfg, data)
     train, test = (data.recordings(split) for split in ("train", "test"))
     clips = [Clip.of(recording, data.crop_rows) for recording in train[: cfg.tune_on]]
-    search = Search(judge, simulator, ranges, clips)
+    search = Search(scoring, simulator, ranges, clips)
     best = run(search, cfg.evaluations)
     measured: dict[str, list[dict[str, float]]] = {"before": [], "after": []}
     for recording in test:
         clip = Clip.of(recording, data.crop_rows)
-        measured["before"].append(clip.measures(judge, simulator))
-        measured["after"].append(clip.measures(judge, best))
+        measured["before"].append(clip.measures(scoring, simulator))
+        measured["after"].append(clip.measures(scoring, best))
     console, results = Console(), Path(cfg.paths.results) / cfg.data.name
     write_table(pd.DataFrame(search.tried), results / f"calibration-{simulator.name}.csv")
     values = {each.parameters[0]: getattr(best, each.parameters[0]) for each in ranges}

@@ -15,7 +15,7 @@ from rich.console import Console
 from eqs.data import EventSource
 from eqs.pipelines.build import Dataset, dataset, event_source
 from eqs.pipelines.command import explained
-from eqs.pipelines.judge import find_judge
+from eqs.pipelines.judge import find_scoring
 from eqs.pipelines.publish import Findings, publish
 from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import Run, finished_runs, recipe_hash
@@ -104,11 +104,11 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     data = dataset(cfg)
     recordings = data.recordings("test")
     systems = scored_systems(cfg, runs)
-    judge = find_judge(cfg, data)  # first: without one, simulating would be in vain
+    scoring = find_scoring(cfg, data)  # first: without one, simulating would be in vain
     for source in systems.values():
         source.prepare(recordings)
     with times.measure("score"):
-        scores = score_recordings(judge, recordings, systems, data.crop_rows)
+        scores = score_recordings(scoring, recordings, systems, data.crop_rows)
     rows = [{"simulator": systems[row["system"]].name, **row} for row in scores.rows]
     table = eqs_table(rows)
     with times.measure("reverse mAP"):
@@ -116,7 +116,8 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     names = short_names([(run.result()["simulator"], run.result()["system"]) for run in runs])
     found = Findings(
         recordings=recordings,
-        judge=judge,
+        judge=scoring.judge,
+        headline=scoring.headline,
         systems=systems,
         runs={names[run.result()["system"]]: run for run in runs},
         scores=scores,
@@ -128,7 +129,9 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         print_study(found.study, console)
     with times.measure("report"):
         publish(cfg, results, data, found, times.read())
-    console.print(f"[bold]judge[/bold]: {judge.description} ({judge.weights_sha256[:12]})")
+    console.print(
+        f"[bold]judge[/bold]: {found.judge.description} ({found.judge.weights_sha256[:12]})"
+    )
     console.print(f"[bold]report[/bold]: {results / 'report.html'}")
     phases = times.read()
     # Trainings may have run side by side, so the sum is work, not waiting.

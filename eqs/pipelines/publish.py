@@ -13,8 +13,8 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from eqs.data import DSECFolder, EventSource, LabelProtocol, RecordedEvents, Recording
+from eqs.metrics import Judge, Reading
 from eqs.pipelines.build import Dataset
-from eqs.pipelines.judge import Judge
 from eqs.pipelines.runs import Run
 from eqs.pipelines.score import Scores
 from eqs.pipelines.showcase import RATE_SPAN_US, WINDOW_US, around, choose, detections
@@ -47,6 +47,7 @@ class Findings:
     Args:
         recordings: the scored recordings.
         judge: what scored them.
+        headline: the reading that is the column `eqs`.
         systems: the scored systems by the name used in the tables.
         runs: the finished run of each trained system, by the name used in the tables.
         scores: maps and anchors.
@@ -56,6 +57,7 @@ class Findings:
 
     recordings: Sequence[Recording]
     judge: Judge
+    headline: Reading
     systems: Mapping[str, EventSource]
     runs: Mapping[str, Run]
     scores: Scores
@@ -73,7 +75,7 @@ def publish(
         write_table(found.study, folder / "study.csv")
         related = correlations(found.study)
         write_correlations(related, folder / "correlation.json")
-    anchors = anchor_table(found.scores.anchors, f"eqs_{found.judge.headline.name}")
+    anchors = anchor_table(found.scores.anchors, f"eqs_{found.headline.name}")
     write_table(anchors, folder / "anchors.csv")
     protocol = instantiate(cfg.protocol)
     generator = data.generator if isinstance(data, DSECFolder) else None
@@ -90,7 +92,7 @@ def publish(
             anchors=anchors,
             figures=draw(folder / "figures", found, protocol, related),
             cards=cards,
-            hashes=hashes(found.judge, sensor),
+            hashes=hashes(found.judge, found.headline, sensor),
             timings=timings,
             unfinished=[name for name in found.systems if cards and name not in found.runs],
             judge=found.judge.description,
@@ -107,14 +109,14 @@ def anchor_table(rows: Sequence[Mapping[str, Any]], headline: str) -> pd.DataFra
     return means.sort_values(headline, ascending=False).reset_index()
 
 
-def hashes(judge: Judge, sensor: str | None) -> dict[str, str]:
+def hashes(judge: Judge, headline: Reading, sensor: str | None) -> dict[str, str]:
     """What identifies the judge, the definition and, where there is one, the reference sensor."""
     named = {
-        "EQS definition": judge.headline.definition.hash,
+        "EQS definition": headline.definition.hash,
         "judge's weights (sha256)": judge.weights_sha256,
     }
-    if judge.headline.centre is not None:
-        named["judge's centre (sha256)"] = judge.headline.centre.sha256
+    if headline.centre is not None:
+        named["judge's centre (sha256)"] = headline.centre.sha256
     if sensor is not None:
         named["reference sensor"] = sensor
     return named

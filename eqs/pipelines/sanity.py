@@ -14,9 +14,9 @@ from rich.progress import track
 
 from eqs.data import Recording, overlap_us
 from eqs.events import EventReader, Events
-from eqs.metrics import EXPECTED_ORDER, GRADED, score_streams, singles
+from eqs.metrics import EXPECTED_ORDER, GRADED, singles
 from eqs.pipelines.build import dataset
-from eqs.pipelines.judge import Judge, find_judge
+from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import ANCHOR_US
 from eqs.study import print_sanity, sanity_figure, sanity_table, save_figure, write_table
 
@@ -30,17 +30,17 @@ def sanity(cfg: DictConfig, results: Path, console: Console) -> None:
         ValueError: there is no judge, or a recording lacks events.
     """
     data = dataset(cfg)
-    judge = find_judge(cfg, data)
+    scoring = find_scoring(cfg, data)
     recordings = data.recordings("test")[: cfg.sanity_recordings]
     rows: list[dict[str, Any]] = []
     for index, recording in enumerate(track(recordings, description="sanity battery")):
         other = recordings[(index + 1) % len(recordings)]
         try:
-            rows += damaged_scores(judge, recording, other, data.crop_rows)
+            rows += damaged_scores(scoring, recording, other, data.crop_rows)
         except ValueError as error:
             raise ValueError(f"{recording.name}: {error}") from error
     table = sanity_table(rows)
-    headline = judge.headline.name
+    headline = scoring.headline.name
     write_table(table, results / "sanity.csv")
     figure = sanity_figure(table, headline, EXPECTED_ORDER)
     save_figure(figure, results / "figures", "sanity")
@@ -49,7 +49,7 @@ def sanity(cfg: DictConfig, results: Path, console: Console) -> None:
 
 
 def damaged_scores(
-    judge: Judge, recording: Recording, other: Recording, rows: int | None
+    scoring: Scoring, recording: Recording, other: Recording, rows: int | None
 ) -> list[dict[str, Any]]:
     """Scores of every damaged copy of one recording, a column for each reading."""
     with ExitStack() as stack:
@@ -66,21 +66,15 @@ def damaged_scores(
         events,
         other=lent if alike and other is not recording else None,
         frame_times_us=recording.frame_times_us,
-        window_us=judge.headline.definition.window_us,
+        window_us=scoring.headline.definition.window_us,
         start_us=start,
         stop_us=stop,
         key=recording.name,
     )
     found = []
     for batch in batches(events, made, recording.name):
-        scores = score_streams(
-            judge.backbone,
-            events,
-            [stream for _, stream in batch],
-            judge.readings,
-            start_us=start,
-            stop_us=stop,
-        )
+        streams = [stream for _, stream in batch]
+        scores = scoring.score(events, streams, start_us=start, stop_us=stop)
         for (named, _), by_reading in zip(batch, scores, strict=True):
             values = {reading: score.score for reading, score in by_reading.items()}
             found.append({"sequence": recording.name, **named, **values})

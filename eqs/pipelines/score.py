@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,10 @@ from rich.progress import track
 
 from eqs.data import EventSource, Recording, overlap_us
 from eqs.events import EventReader
-from eqs.metrics import Reading, anchors, feature_centres, score_streams
+from eqs.metrics import EventQualityScore, anchors
 from eqs.metrics.baselines import FeatureFrechet, baselines
-from eqs.pipelines.judge import Judge
+from eqs.metrics.definition import choices
+from eqs.pipelines.judge import Scoring
 from eqs.study import BASELINE
 
 # Anchors and baselines hold events in memory: a long recording lends its first quarter minute.
@@ -41,7 +42,7 @@ class Scores:
 
 
 def score_recordings(
-    judge: Judge,
+    scoring: Scoring,
     recordings: Sequence[Recording],
     systems: Mapping[str, EventSource],
     rows: int | None = None,
@@ -49,7 +50,7 @@ def score_recordings(
     """Score every system on every recording; the streams must exist already.
 
     Args:
-        judge: what scores.
+        scoring: what scores.
         recordings: recordings with frames and real events.
         systems: where each system's events lie, by its name in the tables.
         rows: rows from the top that are looked at; all of them if None.
@@ -67,14 +68,14 @@ def score_recordings(
             streams = {name: opened(recording, s.path(recording)) for name, s in systems.items()}
             unrelated = opened(other, other.events_path) if other is not recording else None
             try:
-                score_recording(judge, recording, real, streams, unrelated, scores)
+                score_recording(scoring, recording, real, streams, unrelated, scores)
             except ValueError as error:
                 raise ValueError(f"{recording.name}: {error}") from error
     return scores
 
 
 def score_recording(
-    judge: Judge,
+    scoring: Scoring,
     recording: Recording,
     real: EventReader,
     streams: Mapping[str, EventReader],
@@ -84,20 +85,12 @@ def score_recording(
     """Add the scores of one recording; `other` lends the chance level."""
     start, stop = overlap_us(recording.frame_times_us, real.start_us, real.stop_us)
     candidates = list(streams.values())
-    frechet = FeatureFrechet(judge.headline.definition.tap)
-    found = score_streams(
-        judge.backbone,
-        real,
-        candidates,
-        judge.readings,
-        start_us=start,
-        stop_us=stop,
-        watch=frechet,
-    )
-    untrained = untrained_scores(judge, real, candidates, start, stop)
+    frechet = FeatureFrechet(scoring.headline.definition.tap)
+    found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
+    untrained = untrained_scores(scoring, real, candidates, start, stop)
     alike = other is not None and (other.height, other.width) == (real.height, real.width)
     known = score_anchors(
-        judge,
+        scoring,
         real,
         start,
         stop,
@@ -107,16 +100,16 @@ def score_recording(
     )
     shared = {
         "sequence": recording.name,
-        "eqs_chance": known.get("chance", {}).get(judge.headline.name, np.nan),
-        "eqs_ceiling": known["ceiling"][judge.headline.name],
+        "eqs_chance": known.get("chance", {}).get(scoring.headline.name, np.nan),
+        "eqs_ceiling": known["ceiling"][scoring.headline.name],
         "n_events_real": len(real.window(start, stop)),
-        "definition": judge.headline.definition.hash,
-        "weights_sha256": judge.weights_sha256,
+        "definition": scoring.headline.definition.hash,
+        "weights_sha256": scoring.judge.weights_sha256,
     }
     for (name, stream), by_reading, without, distance in zip(
         streams.items(), found, untrained, frechet.values(), strict=True
     ):
-        headline = by_reading[judge.headline.name]
+        headline = by_reading[scoring.headline.name]
         scores.maps.setdefault(name, []).append(headline.map)
         scores.patch_px = headline.patch_px
         scores.rows.append(
@@ -125,7 +118,7 @@ def score_recording(
                 **shared,
                 "eqs": headline.score,
                 **{f"eqs_{reading}": score.score for reading, score in by_reading.items()},
-                **score_baselines(judge, stream, real, start, stop, recording.frame_times_us),
+                **score_baselines(scoring, stream, real, start, stop, recording.frame_times_us),
                 f"{BASELINE}untrained_eqs": without,
                 f"{BASELINE}frechet_distance": distance,
                 "n_windows": headline.n_windows,
@@ -138,22 +131,25 @@ def score_recording(
 
 
 def untrained_scores(
-    judge: Judge, real: EventReader, candidates: Sequence[EventReader], start_us: int, stop_us: int
+    scoring: Scoring,
+    real: EventReader,
+    candidates: Sequence[EventReader],
+    start_us: int,
+    stop_us: int,
 ) -> list[float]:
-    """The headline with the untrained network, whose centre is this recording's own."""
-    definition = judge.headline.definition
-    if definition.features == "raw":
-        definition = replace(definition, features="centred")
-    centres = feature_centres(judge.untrained, [real], taps=[definition.tap], definition=definition)
-    reading = Reading(definition=definition, centre=centres[definition.tap])
-    found = score_streams(
-        judge.untrained, real, candidates, [reading], start_us=start_us, stop_us=stop_us
-    )
-    return [by_reading[reading.name].score for by_reading in found]
+    """The headline with an untrained network, whose centre is this recording's own."""
+    headline = scoring.headline.definition
+    chosen = {name: getattr(headline, name) for name in choices()}
+    if headline.features == "raw":
+        chosen["features"] = "centred"
+    control = scoring.judge.untrained().centred_on([real], [headline.tap], **chosen)
+    metric = EventQualityScore(control, chunk_windows=scoring.metric.chunk_windows, **chosen)
+    found = metric.score(real, candidates, start_us=start_us, stop_us=stop_us)
+    return [by_reading[metric.reading.name].score for by_reading in found]
 
 
 def score_baselines(
-    judge: Judge,
+    scoring: Scoring,
     stream: EventReader,
     real: EventReader,
     start_us: int,
@@ -165,7 +161,7 @@ def score_baselines(
     found = baselines(
         stream.window(start_us, stop_us),
         real.window(start_us, stop_us),
-        judge.headline.definition,
+        scoring.headline.definition,
         start_us=start_us,
         stop_us=stop_us,
         frame_times_us=frame_times_us,
@@ -174,7 +170,7 @@ def score_baselines(
 
 
 def score_anchors(
-    judge: Judge,
+    scoring: Scoring,
     real: EventReader,
     start_us: int,
     stop_us: int,
@@ -190,19 +186,12 @@ def score_anchors(
         events,
         other=None if other is None else other.window(other.start_us, other.start_us + ANCHOR_US),
         frame_times_us=frame_times_us,
-        window_us=judge.headline.definition.window_us,
+        window_us=scoring.headline.definition.window_us,
         start_us=start_us,
         stop_us=stop_us,
         key=key,
     )
-    found = score_streams(
-        judge.backbone,
-        events,
-        list(streams.values()),
-        judge.readings,
-        start_us=start_us,
-        stop_us=stop_us,
-    )
+    found = scoring.score(events, list(streams.values()), start_us=start_us, stop_us=stop_us)
     return {
         name: {reading: score.score for reading, score in by_reading.items()}
         for name, by_reading in zip(streams, found, strict=True)

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from eqs.events import EventReader
 from eqs.files import write_json
-from eqs.metrics import score_streams
+from eqs.metrics import window_starts
 from eqs.pipelines.command import explained
-from eqs.pipelines.judge import Judge, find_judge
+from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import score_anchors
 from eqs.study import save_figure, score_curve, score_maps, write_table
 
@@ -28,73 +28,69 @@ def score_files(cfg: DictConfig) -> None:
         FileNotFoundError: a file is missing.
         ValueError: there is no judge, or the streams share no whole window or no sensor size.
     """
-    judge = find_judge(cfg, None)
+    scoring = find_scoring(cfg, None)
+    headline = scoring.headline.definition
     size = (cfg.height, cfg.width)
     with (
         EventReader(cfg.real, *size) as real,
         EventReader(cfg.simulated, *size) as simulated,
     ):
-        span = max(real.start_us, simulated.start_us), min(real.stop_us, simulated.stop_us)
-        found = score_streams(
-            judge.backbone,
-            real,
-            [simulated],
-            judge.readings,
-            start_us=span[0],
-            stop_us=span[1],
-        )[0]
-        known = score_anchors(judge, real, *span)
+        starts = window_starts([real, simulated], headline.window_us, cfg.start_us, cfg.stop_us)
+        span = int(starts[0]), int(starts[-1]) + headline.window_us
+        (found,) = scoring.score(real, [simulated], start_us=span[0], stop_us=span[1])
+        known = score_anchors(scoring, real, *span)
         counts = {
             "simulated": len(simulated.window(*span)),
             "real": len(real.window(*span)),
         }
         height, width = real.height, real.width
     scores = {name: score.score for name, score in found.items()}
-    headline, out = found[judge.headline.name], Path(cfg.out)
+    result, out = found[scoring.headline.name], Path(cfg.out)
     write_json(
         out / "score.json",
         {
             "simulated": str(cfg.simulated),
             "real": str(cfg.real),
-            "eqs": headline.score,
+            "eqs": result.score,
             "readings": scores,
-            "by_stage": list(headline.by_stage),
+            "by_stage": list(result.by_stage),
             "anchors": known,
-            "windows": headline.n_windows,
+            "span_us": list(span),
+            "windows": result.n_windows,
             "events": counts,
-            "definition": judge.headline.definition.hash,
-            "weights_sha256": judge.weights_sha256,
+            "definition": headline.hash,
+            "weights_sha256": scoring.judge.weights_sha256,
         },
     )
-    window_us = judge.headline.definition.window_us
-    number = np.arange(len(headline.curve))
+    window_us = headline.window_us
+    number = np.arange(len(result.curve))
     curve = {
         "stop_us": span[0] + (number + 1) * window_us,
-        "eqs": headline.curve,
-        "counts": number >= headline.warmup,
+        "eqs": result.curve,
+        "counts": number >= result.warmup,
     }
     write_table(pd.DataFrame(curve), out / "curve.csv")
-    panel = {"simulated": headline.map}
-    drawn = score_maps(None, panel, patch_px=headline.patch_px, height=height, width=width)
+    panel = {"simulated": result.map}
+    drawn = score_maps(None, panel, patch_px=result.patch_px, height=height, width=width)
     save_figure(drawn, out, "map")
     save_figure(
         score_curve(
-            headline.curve,
-            warmup=headline.warmup,
+            result.curve,
+            warmup=result.warmup,
             window_us=window_us,
-            ceiling=known["ceiling"][judge.headline.name],
+            ceiling=known["ceiling"][scoring.headline.name],
         ),
         out,
         "curve",
     )
-    show(scores, known, counts, judge, Console())
+    show(scores, known, counts, scoring, Console())
 
 
 def show(
     scores: dict[str, float],
     known: dict[str, dict[str, float]],
     counts: dict[str, Any],
-    judge: Judge,
+    scoring: Scoring,
     console: Console,
 ) -> None:
     """Print every reading beside its anchors, the headline first."""
@@ -109,5 +105,5 @@ def show(
     console.print(table)
     console.print(
         f"{counts['simulated']} simulated and {counts['real']} real events; "
-        f"judge: {judge.description} ({judge.weights_sha256[:12]})"
+        f"judge: {scoring.judge.description} ({scoring.judge.weights_sha256[:12]})"
     )

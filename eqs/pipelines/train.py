@@ -20,6 +20,7 @@ from eqs.files import short_hash
 from eqs.models.checkpoint import check_resumable
 from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
+from eqs.pipelines.judge import write_judge
 from eqs.pipelines.prepare import prepare_data, prepare_stream
 from eqs.pipelines.runs import Run, recipe_hash
 from eqs.pipelines.timing import PhaseTimes, phase_times
@@ -70,8 +71,12 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
         trainer.fit(task, datamodule, ckpt_path=checkpoint)
         trainer.save_checkpoint(run.weights, weights_only=True)
         metrics = trainer.test(task, datamodule, verbose=False)
+        seconds = time.perf_counter() - start
+    if isinstance(source, RecordedEvents) and trainer.is_global_zero:
+        with times.measure("judge"):
+            write_judge(cfg, run, data, trainer.strategy.root_device)
     values = {name: value for stream in metrics for name, value in stream.items()}
-    run.finish(describe(cfg, source, protocol.card(), values, time.perf_counter() - start))
+    run.finish(describe(cfg, source, protocol.card(), values, seconds))
 
 
 def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]) -> DetectionTask:

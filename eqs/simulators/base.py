@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -86,7 +86,7 @@ class Simulator(ABC):
         return Stream(self, sequence)
 
     def simulate(self, frames: NDArray[Any], timestamps_us: Any, sequence: str = "") -> Events:  # noqa: ANN401
-        """The events of a whole clip.
+        """The events of a whole clip, with the time from its first to its last frame as their span.
 
         Args:
             frames: `(N, H, W)` grey or `(N, H, W, 3)` RGB, uint8 or floating, levels 0..255.
@@ -97,7 +97,8 @@ class Simulator(ABC):
             ValueError: the clip has fewer than two frames, or is none.
         """
         stream = self.start(sequence)
-        return Events.concatenate([stream.step(frames, timestamps_us), stream.finish()])
+        events = Events.concatenate([stream.step(frames, timestamps_us), stream.finish()])
+        return replace(events, span_us=stream.span_us)
 
 
 @dataclass(frozen=True, kw_only=True)

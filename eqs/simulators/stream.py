@@ -104,6 +104,11 @@ class Stream:
                     yield made, at
         yield frame, time_us
 
+    @property
+    def span_us(self) -> tuple[int, int]:
+        """Times of the first and of the last frame so far, microseconds."""
+        return self._origin_us, self._last_us
+
     def finish(self) -> Events:
         """End the sequence and give the events that were held back.
 

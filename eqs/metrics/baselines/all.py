@@ -37,7 +37,7 @@ def baselines(
         ValueError: the sensors differ, or no whole window fits.
     """
     check_sensors([simulated, real])
-    starts = window_starts([simulated, real], definition.window_us, start_us, stop_us)
+    starts = window_starts([real, simulated], definition.window_us, start_us, stop_us)
     first, last = int(starts[0]), int(starts[-1]) + definition.window_us
     simulated, real = simulated.window(first, last), real.window(first, last)
     window = definition.window_us

@@ -1,0 +1,359 @@
+"""What scores streams: a frozen network with its hash, its definition and its real centres."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+import torch
+from torch import nn
+
+from eqs.files import read_json, write_json
+from eqs.metrics.centre import Centre, feature_centres
+from eqs.metrics.definition import Definition, choices
+from eqs.metrics.features import TappedBackbone
+from eqs.metrics.scoring import Reading
+from eqs.metrics.windows import StreamOrHistograms
+
+RECORD, WEIGHTS = "judge.json", "weights.ckpt"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RVTShape:
+    """What a file of RVT's weights does not say, or not by itself, about their network.
+
+    Args:
+        size: tiny, small or base.
+        bins: time bins per polarity, half the input channels.
+        partition_split_32: attention windows per side of the backbone's last stage.
+    """
+
+    size: str = "small"
+    bins: int = 10
+    partition_split_32: int = 2
+
+    @property
+    def architecture(self) -> str:
+        """The name that a definition knows it by."""
+        return f"rvt-{self.size}-split{self.partition_split_32}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judge:
+    """A frozen network and what its scores are measured against, the same for every candidate.
+
+    On disk it is a folder: `judge.json` beside the weights and the centres that it names by their
+    hashes. `train.py sim=real` writes one into the run's folder.
+
+    Args:
+        backbone: the network.
+        definition: what its scores mean where nobody chooses otherwise: the headline.
+        weights_sha256: hash of the network's named tensors; empty where it has none.
+        centres: mean real features, one for each activation and way to pool; without any, scores
+            are raw.
+        shape: what builds the network again; None for networks that are no RVT.
+        description: what it was trained on, in a phrase.
+
+    Example:
+        >>> judge = Judge.random(size="tiny")
+        >>> judge.definition.features, judge.reading(tap="gate").name
+        ('raw', 'gate_raw')
+    """
+
+    backbone: TappedBackbone
+    definition: Definition = field(default_factory=Definition)
+    weights_sha256: str = ""
+    centres: tuple[Centre, ...] = ()
+    shape: RVTShape | None = None
+    description: str = "a network given in memory"
+
+    @classmethod
+    def of(cls, backbone: TappedBackbone, **chosen: Any) -> Self:  # noqa: ANN401
+        """A judge around any network with `taps`.
+
+        Args:
+            backbone: the network.
+            **chosen: choices of the headline, see `Definition`.
+        """
+        digest = weights_sha256(backbone) if isinstance(backbone, nn.Module) else ""
+        definition = Definition(**{"architecture": type(backbone).__name__, **chosen})
+        return cls(backbone=backbone, definition=definition, weights_sha256=digest)
+
+    @classmethod
+    def random(cls, seed: int = 0, **shape: Any) -> Self:  # noqa: ANN401
+        """The control: an RVT that learnt nothing; the same seed gives the same weights.
+
+        Args:
+            seed: seed of the weights.
+            **shape: see `RVTShape`.
+        """
+        from eqs.models import RVTDetector  # torch's modules, which reading a record does without
+
+        built = RVTShape(**shape)
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            model = RVTDetector(
+                size=built.size,
+                in_channels=2 * built.bins,
+                partition_split_32=built.partition_split_32,
+            )
+        return cls._of_rvt(model.backbone, built, "random weights, a control")
+
+    @classmethod
+    def from_checkpoint(cls, path: Path | str, partition_split_32: int = 2) -> Self:
+        """A judge without centres from a detector's checkpoint, whose scores are raw.
+
+        Args:
+            path: checkpoint of an RVT detector trained on real events.
+            partition_split_32: as it was trained; no checkpoint says so.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: the file holds no detector of a known size.
+        """
+        from eqs.models import backbone_from_checkpoint
+
+        backbone, size = backbone_from_checkpoint(path, partition_split_32)
+        shape = RVTShape(
+            size=size, bins=backbone.in_channels // 2, partition_split_32=partition_split_32
+        )
+        return cls._of_rvt(backbone, shape, f"weights of {Path(path).name}")
+
+    @classmethod
+    def _of_rvt(cls, backbone: nn.Module, shape: RVTShape, description: str) -> Self:
+        return cls(
+            backbone=backbone.eval().requires_grad_(False),  # type: ignore[arg-type]
+            definition=Definition(bins=shape.bins, architecture=shape.architecture),
+            weights_sha256=weights_sha256(backbone),
+            shape=shape,
+            description=description,
+        )
+
+    @classmethod
+    def load(cls, place: Path | str, partition_split_32: int | None = None) -> Self:
+        """The judge of a folder or of a checkpoint, or the control for the word `random`.
+
+        Weights that lie in a judge's folder are that judge.
+
+        Args:
+            place: folder with `judge.json`, checkpoint of a detector, or `random`.
+            partition_split_32: of a bare checkpoint, where it is not 2; a folder knows its own.
+
+        Raises:
+            FileNotFoundError: there is neither.
+            ValueError: weights or centres are not those that the record names.
+        """
+        path = Path(place)
+        folder = path.parent if path.name == WEIGHTS else path
+        given = {} if partition_split_32 is None else {"partition_split_32": partition_split_32}
+        if (folder / RECORD).is_file():
+            judge = cls._of_folder(folder)
+            trained = judge._rvt_shape().partition_split_32
+            if partition_split_32 not in (None, trained):
+                raise ValueError(
+                    f"Expected the judge in {folder} with partition_split_32={trained}, as it was "
+                    f"trained, got {partition_split_32}; leave eqs.partition_split_32 out"
+                )
+            return judge
+        if str(place) == "random":
+            return cls.random(**given)
+        if path.is_dir():
+            raise FileNotFoundError(
+                f"Expected {RECORD} in {path}, got a folder without; set eqs.judge to the folder "
+                "of a finished `train.py sim=real`, or to a checkpoint"
+            )
+        return cls.from_checkpoint(path, **given)
+
+    @classmethod
+    def _of_folder(cls, folder: Path) -> Self:
+        from eqs.models import backbone_from_checkpoint
+
+        record = read_json(folder / RECORD)
+        try:
+            shape = RVTShape(**record["network"])
+            stages = tuple(record["definition"].pop("stages"))
+            definition = Definition(**record["definition"], stages=stages)
+            files, description = record["centres"], record["description"]
+            digest, weights = record["weights_sha256"], folder / record["weights"]
+        except (KeyError, TypeError) as error:
+            raise ValueError(
+                f"Expected a judge written by this package in {folder}, got a {RECORD} that "
+                f"lacks or adds {error}; delete that file and type the command again"
+            ) from error
+        backbone, _ = backbone_from_checkpoint(weights, shape.partition_split_32)
+        judge = cls._of_rvt(backbone, shape, description)
+        centres = {name: Centre.load(folder / name) for name in files}
+        changed = [name for name, centre in centres.items() if centre.sha256 != files[name]]
+        if judge.weights_sha256 != digest:
+            changed.insert(0, weights.name)
+        if changed:
+            raise ValueError(
+                f"Expected the files of the judge in {folder} to match their hashes, got others "
+                f"in {', '.join(changed)}; set eqs.judge to another, or delete {RECORD}"
+            )
+        return replace(judge, definition=definition, centres=tuple(centres.values()))
+
+    def save(self, folder: Path | str) -> None:
+        """Write the folder that `load` reads; weights that lie there already are kept.
+
+        Raises:
+            ValueError: the network is no RVT, so nothing could build it again.
+        """
+        shape, target = self._rvt_shape(), Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        if not self._weights_lie_in(target):
+            names = self.backbone.state_dict()  # type: ignore[attr-defined]
+            partial = target / f"{WEIGHTS}.partial"
+            torch.save({f"backbone.{name}": x.cpu() for name, x in names.items()}, partial)
+            partial.replace(target / WEIGHTS)
+        for centre in self.centres:
+            centre.save(target / _file_of(centre))
+        write_json(
+            target / RECORD,
+            {
+                "description": self.description,
+                "network": asdict(shape),
+                "definition": asdict(self.definition),
+                "weights": WEIGHTS,
+                "weights_sha256": self.weights_sha256,
+                "centres": {_file_of(centre): centre.sha256 for centre in self.centres},
+            },
+        )
+
+    def _weights_lie_in(self, folder: Path) -> bool:
+        if not (folder / WEIGHTS).is_file():
+            return False
+        found = Judge.from_checkpoint(folder / WEIGHTS, self._rvt_shape().partition_split_32)
+        return found.weights_sha256 == self.weights_sha256
+
+    def define(self, **chosen: Any) -> Definition:  # noqa: ANN401
+        """The judge's definition with other choices.
+
+        Raises:
+            ValueError: there is no such choice, or not that value of it.
+        """
+        unknown = chosen.keys() - {*choices()}
+        if unknown:
+            raise ValueError(
+                f"Expected choices among {', '.join(choices())}, got {', '.join(sorted(unknown))}; "
+                "set one of these"
+            )
+        if chosen.get("bins", self.definition.bins) != self.definition.bins:
+            raise ValueError(
+                f"Expected {self.definition.bins} bins, as the judge was trained with, got "
+                f"{chosen['bins']}; set eqs.bins or eqs.judge"
+            )
+        stages = tuple(chosen.get("stages", self.definition.stages))
+        return replace(self.definition, **{**chosen, "stages": stages})
+
+    def reading(self, **chosen: Any) -> Reading:  # noqa: ANN401
+        """What is compared and how: the headline where nothing is chosen.
+
+        Raises:
+            ValueError: a choice is impossible, or it needs a centre that the judge lacks.
+        """
+        definition = self.define(**chosen)
+        if definition.features == "raw":
+            return Reading(definition=definition)
+        centre = self.centre_for(definition)
+        if centre is None:
+            raise ValueError(
+                f"Expected a judge with a centre of the activation {definition.tap}, pooled and "
+                f"binned as chosen, for {definition.features} features, got one without; set "
+                "eqs.judge, or eqs.features=raw"
+            )
+        return Reading(definition=definition, centre=centre)
+
+    def centre_for(self, definition: Definition) -> Centre | None:
+        """The centre that belongs to a definition, if the judge has it."""
+        for centre in self.centres:
+            if centre.tap == definition.tap and centre.features_hash in (
+                "",
+                definition.features_hash,
+            ):
+                return centre
+        return None
+
+    def centred_on(
+        self,
+        recordings: Iterable[StreamOrHistograms],
+        taps: Sequence[str] = ("hidden",),
+        *,
+        chunk_windows: int | None = None,
+        **chosen: Any,  # noqa: ANN401
+    ) -> Self:
+        """The same judge with the mean features of real recordings; its headline is then centred.
+
+        Args:
+            recordings: real recordings, those the network was trained on.
+            taps: activations to compute a centre for.
+            chunk_windows: windows per pass; chosen from the sensor size if None.
+            **chosen: how features are pooled and binned, where not as in the headline.
+
+        Raises:
+            ValueError: there is no recording, or a feature is not finite.
+        """
+        made = feature_centres(
+            self.backbone,
+            recordings,
+            taps=taps,
+            definition=self.define(**chosen),
+            chunk_windows=chunk_windows,
+            device=self.device,
+        )
+        new = {_file_of(centre): centre for centre in made.values()}
+        kept = {_file_of(centre): centre for centre in self.centres}
+        headline = replace(self.definition, features="centred")
+        return replace(self, definition=headline, centres=tuple({**kept, **new}.values()))
+
+    def untrained(self, seed: int = 0) -> Judge:
+        """The control of this judge: its network with random weights and no centre.
+
+        Raises:
+            ValueError: the network is no RVT.
+        """
+        control = Judge.random(seed, **asdict(self._rvt_shape())).to(self.device)
+        return replace(control, definition=replace(self.definition, features="raw"))
+
+    def _rvt_shape(self) -> RVTShape:
+        if self.shape is None:
+            raise ValueError(
+                f"Expected an RVT, which can be built anew, got a {self.definition.architecture}; "
+                "use a judge that is one"
+            )
+        return self.shape
+
+    @property
+    def device(self) -> torch.device:
+        """Where the network lives."""
+        if isinstance(self.backbone, nn.Module):
+            for parameter in self.backbone.parameters():
+                return parameter.device
+        return torch.device("cpu")
+
+    def to(self, device: torch.device | str) -> Self:
+        """Move the network; the judge itself is returned."""
+        if isinstance(self.backbone, nn.Module):
+            self.backbone.to(device)
+        return self
+
+
+def weights_sha256(module: nn.Module) -> str:
+    """The sha256 of a module's named tensors, whatever file they came in.
+
+    Convention: it covers names, shapes, types and values in the order of the names.
+    """
+    digest = hashlib.sha256()
+    for name, tensor in sorted(module.state_dict().items()):
+        data = tensor.detach().cpu().contiguous()
+        digest.update(f"{name} {tuple(data.shape)} {data.dtype}".encode())
+        digest.update(data.reshape(-1).view(torch.uint8).numpy().tobytes())
+    return digest.hexdigest()
+
+
+def _file_of(centre: Centre) -> str:
+    """One file for each activation and way to pool."""
+    return "-".join(filter(None, ("centre", centre.tap, centre.features_hash))) + ".npz"
