@@ -180,8 +180,9 @@ class EventQualityScore(Metric):
         """
         (scores,) = self.score(real, [simulated], start_us=start_us, stop_us=stop_us)
         self.last = scores[self.reading.name]
-        self.total += self.last.score
-        self.sequences += 1
+        # Not in place: Lightning resets metrics under inference mode, which would forbid it.
+        self.total = self.total + self.last.score
+        self.sequences = self.sequences + 1
 
     def compute(self) -> Tensor:
         """Unweighted mean over the sequences seen.

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from benchmarks.timing import Cost, in_own_process, time_runs
 from eqs.events import Events
-from eqs.metrics import Definition, Reading, group_chunks, load_backbone, score_streams
+from eqs.metrics import Definition, Judge, Reading, group_chunks, score_streams
 from eqs.metrics.windows import chunk_length
 
 STAGES: Final = (1, 2, 3)
@@ -79,7 +79,7 @@ def histograms(job: Job) -> list[Tensor]:
 
 def passes(job: Job) -> Callable[[], None]:
     """Each stream through the first stages, as many windows at a time as the score takes."""
-    backbone, _ = load_backbone("random")
+    backbone = Judge.random().backbone
     streams = histograms(job)
     length = chunk_length(2, *job.size)
 
@@ -106,7 +106,7 @@ def events(job: Job) -> Callable[[], None]:
 
 
 def _scored(streams: list, stop_us: int | None = None) -> Callable[[], None]:
-    backbone, _ = load_backbone("random")
+    backbone = Judge.random().backbone
     reading = Reading(definition=Definition(stages=STAGES))
     start_us = None if stop_us is None else 0
 

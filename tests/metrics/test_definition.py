@@ -3,9 +3,8 @@
 from dataclasses import fields, replace
 
 import pytest
-import torch
 
-from eqs.metrics import Definition, weights_sha256
+from eqs.metrics import Definition
 from eqs.metrics.definition import FIXED_RULES
 
 OTHER = {
@@ -83,20 +82,3 @@ def test_warmup_is_at_most_a_quarter(windows, warmup):
 def test_impossible_choices_are_refused(choice, message):
     with pytest.raises(ValueError, match=message):
         Definition(**choice)
-
-
-def test_weights_hash_sees_values_and_names(tmp_path):
-    a, b = torch.nn.Linear(2, 2), torch.nn.Linear(2, 2)
-    b.load_state_dict(a.state_dict())
-    assert weights_sha256(a) == weights_sha256(b)
-    with torch.no_grad():
-        b.bias[0] += 1
-    assert weights_sha256(a) != weights_sha256(b)
-    assert weights_sha256(a) != weights_sha256(torch.nn.Sequential(a))
-    (tmp_path / "w.ckpt").write_bytes(b"abc")
-    assert weights_sha256(tmp_path / "w.ckpt").startswith("ba7816bf8f01cfea")
-
-
-def test_missing_weights_are_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"gone.ckpt, got no file; set eqs.weights"):
-        weights_sha256(tmp_path / "gone.ckpt")

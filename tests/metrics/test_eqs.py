@@ -11,6 +11,7 @@ from eqs.metrics import (
     Centre,
     Definition,
     EventQualityScore,
+    Judge,
     Reading,
     feature_centres,
     patch_cosine,
@@ -19,7 +20,7 @@ from eqs.metrics import (
     smooth_patches,
     whitening_matrix,
 )
-from eqs.metrics.definition import KINDS
+from eqs.metrics.definition import kinds
 
 BASE = Definition(bins=2, window_us=50_000)
 TAPS = ("gate", "hidden", "downsample")
@@ -42,7 +43,7 @@ def centres(backbone, make_events):
 def test_identical_streams_score_one(backbone, make_events, centres):
     events = make_events(1)
     (scores,) = score_streams(backbone, events, [events], readings(*TAPS, centres=centres))
-    assert set(scores) == {f"{tap}_{kind}" for tap in TAPS for kind in KINDS["features"]}
+    assert set(scores) == {f"{tap}_{kind}" for tap in TAPS for kind in kinds()["features"]}
     for score in scores.values():
         assert score.score == pytest.approx(1, abs=1e-6)
         np.testing.assert_allclose(score.map, 1, atol=1e-6)
@@ -298,8 +299,47 @@ def test_one_reference_pass_serves_all(backbone, make_events):
     assert backbone.calls == 1
 
 
+def test_a_late_simulator_is_scored_as_silent_and_not_over_what_is_left(backbone, make_events):
+    real, late = make_events(1), make_events(1)
+    late = late.window(500_000, 1_000_000)
+    metric = EventQualityScore(Judge.of(backbone, bins=2))
+    metric.update(late, real)
+    assert len(metric.last.curve) == 19
+    assert metric.last.curve[:9].max() < metric.last.curve[12:].min()
+    whole = metric.last.score
+    metric.update(late, real, 500_000, 1_000_000)
+    assert metric.last.score == pytest.approx(1, abs=1e-6)
+    assert whole < 0.995
+
+
+def test_a_stated_span_narrows_what_is_scored(backbone, make_events):
+    real, late = make_events(1), make_events(2).window(500_000, 1_000_000)
+    metric = EventQualityScore(Judge.of(backbone, bins=2))
+    metric.update(replace(late, span_us=(500_000, 900_000)), real)
+    stated = metric.last.curve
+    metric.update(late, real, 500_000, 900_000)
+    np.testing.assert_array_equal(stated, metric.last.curve)
+    assert len(stated) == 8
+
+
+@pytest.mark.parametrize("features", ["raw", "centred", "whitened"])
+@pytest.mark.parametrize("mask", ["none", "active"])
+def test_the_loss_is_the_distance_and_has_gradients(backbone, make_events, features, mask):
+    judge = Judge.of(backbone, bins=2).centred_on([make_events(11), make_events(12)])
+    metric = EventQualityScore(judge, features=features, mask=mask, warmup_windows=2)
+    real, simulated = torch.randint(0, 4, (2, 9, 4, 16, 24)).float()
+    simulated.requires_grad_()
+    loss = metric.loss(simulated, real)
+    metric.update(simulated.detach(), real)
+    assert loss.item() == pytest.approx(metric.last.distance, abs=1e-6)
+    loss.backward()
+    step = 0.01 * simulated.grad / simulated.grad.norm()
+    assert metric.loss(simulated.detach() - step, real) < loss.item()
+    assert simulated.grad[:2].abs().max() > 0  # the warm-up acts on what follows it
+
+
 def test_metric_averages_sequences_with_equal_weight(backbone, make_events):
-    metric = EventQualityScore(backbone=backbone, bins=2)
+    metric = EventQualityScore(Judge.of(backbone, bins=2))
     scores = []
     for seed, stop_us in ((1, 400_000), (3, 900_000)):
         metric.update(make_events(seed, stop_us=stop_us), make_events(seed + 1, stop_us=stop_us))
@@ -317,14 +357,14 @@ def test_metric_takes_histograms_and_events_alike(backbone, make_events):
     a, b = make_events(1), make_events(2)
     chunks, _ = group_chunks([b, a], BASE, start_us=0, stop_us=1_000_000)
     histograms = torch.cat(list(chunks))
-    metric = EventQualityScore(backbone=backbone, bins=2)
+    metric = EventQualityScore(Judge.of(backbone, bins=2))
     metric.update(a, b, 0, 1_000_000)
     metric.update(histograms[:, 1], histograms[:, 0])
     assert float(metric.compute()) == pytest.approx(metric.last.score, abs=1e-9)
 
 
 def test_forward_gives_the_sequence_and_keeps_the_mean(backbone, make_events):
-    metric = EventQualityScore(backbone=backbone, bins=2)
+    metric = EventQualityScore(Judge.of(backbone, bins=2))
     first = float(metric(make_events(1), make_events(2)))
     second = float(metric(make_events(3), make_events(3)))
     assert second == pytest.approx(1, abs=1e-6)
@@ -332,7 +372,7 @@ def test_forward_gives_the_sequence_and_keeps_the_mean(backbone, make_events):
 
 
 def test_silence_has_a_documented_score(backbone, make_events):
-    metric = EventQualityScore(backbone=backbone, bins=2)
+    metric = EventQualityScore(Judge.of(backbone, bins=2))
     empty = Events.empty(20, 28)
     metric.update(empty, make_events(1))
     assert -1 <= metric.last.score < 0.99
@@ -341,37 +381,32 @@ def test_silence_has_a_documented_score(backbone, make_events):
 
 
 def test_refusals_of_the_metric(backbone, make_events, tmp_path):
-    metric = EventQualityScore(backbone=backbone, bins=2)
+    metric = EventQualityScore(Judge.of(backbone, bins=2))
     with pytest.raises(ValueError, match="one sensor size, got 28x20 and 30x20"):
         metric.update(make_events(1, width=30), make_events(2))
     with pytest.raises(ValueError, match="overlap in time"):
         metric.update(make_events(1), make_events(2).shifted(5_000_000))
-    with pytest.raises(ValueError, match=r"weights or a backbone, got neither; set eqs.weights"):
-        EventQualityScore()
-    with pytest.raises(ValueError, match=r"weights or a backbone, got both"):
-        EventQualityScore("random", backbone=backbone)
-    with pytest.raises(ValueError, match="Expected a centre for centred features, got none"):
-        EventQualityScore(backbone=backbone, features="centred")
-    with pytest.raises(FileNotFoundError, match=r"gone.npz, got no file; set eqs.centre"):
-        EventQualityScore(backbone=backbone, centre=tmp_path / "gone.npz")
-    with pytest.raises(ValueError, match=r"each of the stages \(1, 2, 3\), got 1"):
-        EventQualityScore(backbone=backbone, centre=[torch.zeros(6)])
+    judge = Judge.of(backbone, bins=2)
+    with pytest.raises(ValueError, match=r"for centred features, got one without; set eqs\.judge"):
+        EventQualityScore(judge, features="centred")
+    with pytest.raises(ValueError, match="Expected 2 bins, as the judge was trained with, got 5"):
+        EventQualityScore(judge, bins=5)
+    with pytest.raises(ValueError, match="Unexpected keyword arguments: `pach_size`"):
+        EventQualityScore(judge, pach_size=2)
     with pytest.raises(ValueError, match=r"stages up to 3, got \(1, 4\)"):
-        EventQualityScore(backbone=backbone, bins=2, stages=(1, 4)).update(
-            make_events(1), make_events(1)
-        )
+        EventQualityScore(judge, stages=(1, 4)).update(make_events(1), make_events(1))
 
 
 @pytest.mark.filterwarnings("ignore:The ``compute`` method:UserWarning")
 def test_compute_needs_an_update(backbone):
     with pytest.raises(ValueError, match="at least one update"):
-        EventQualityScore(backbone=backbone).compute()
+        EventQualityScore(Judge.of(backbone)).compute()
 
 
 def test_broken_weights_are_never_a_silent_nan(backbone, make_events):
     with torch.no_grad():
         backbone.convolutions[1].weight[0] = torch.nan
-    with pytest.raises(ValueError, match=r"finite features, got NaN or infinity; set eqs.weights"):
+    with pytest.raises(ValueError, match=r"finite features, got NaN or infinity; set eqs.judge"):
         score_streams(backbone, make_events(1), [make_events(2)], readings("hidden"))
     with pytest.raises(ValueError, match="finite features"):
         feature_centres(backbone, [make_events(1)], taps=["hidden"], definition=BASE)
@@ -486,10 +521,9 @@ def test_damaged_centres_are_refused(centres, tmp_path):
 def test_centre_of_fewer_stages_is_refused(backbone, make_events, centres):
     whole = centres["hidden"]
     short = Centre(tap="hidden", stages=(1,), means=whole.means[:1])
+    judge = replace(Judge.of(backbone, bins=2), centres=(short,))
     with pytest.raises(ValueError, match=r"centre of stages \(1, 2, 3\), got one of \(1,\)"):
-        EventQualityScore(backbone=backbone, bins=2, centre=short).update(
-            make_events(1), make_events(1)
-        )
+        EventQualityScore(judge, features="centred").update(make_events(1), make_events(1))
 
 
 def test_centres_need_a_recording(backbone):

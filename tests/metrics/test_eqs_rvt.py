@@ -8,16 +8,17 @@ import torch
 
 from eqs.events import Events
 from eqs.metrics import (
+    ACTIVATIONS,
     Definition,
     EventQualityScore,
+    Judge,
     Reading,
     anchors,
     feature_centres,
-    load_backbone,
     score_streams,
 )
-from eqs.metrics.definition import TAPS
 from eqs.models import RVTDetector
+from eqs.representations import soft_histogram
 
 BASE = Definition(architecture="rvt-tiny-split1")
 SETTINGS = {"size": "tiny", "partition_split_32": 1}
@@ -40,13 +41,15 @@ def moving_edges(seed, duration_us=400_000, count=30_000):
 
 @pytest.fixture(scope="module")
 def judge():
-    return load_backbone("random", **SETTINGS)[0]
+    return Judge.random(**SETTINGS).backbone
 
 
 @pytest.fixture(scope="module")
 def readings(judge):
-    centres = feature_centres(judge, [moving_edges(8), moving_edges(9)], taps=TAPS, definition=BASE)
-    raw = [Reading(definition=replace(BASE, tap=tap)) for tap in TAPS]
+    centres = feature_centres(
+        judge, [moving_edges(8), moving_edges(9)], taps=ACTIVATIONS, definition=BASE
+    )
+    raw = [Reading(definition=replace(BASE, tap=tap)) for tap in ACTIVATIONS]
     return raw + [
         Reading(definition=replace(BASE, tap=tap, features=features), centre=centre)
         for tap, centre in centres.items()
@@ -65,7 +68,7 @@ def scores(judge, readings):
 
 
 def test_identity_for_every_tap(scores):
-    assert len(scores["identical"]) == 3 * len(TAPS)
+    assert len(scores["identical"]) == 3 * len(ACTIVATIONS)
     for name, score in scores["identical"].items():
         assert score.score == pytest.approx(1, abs=1e-6), name
 
@@ -115,31 +118,57 @@ def test_autocast_outside_does_not_reach_the_score(judge, readings):
     assert all(cast[name].score == plain[name].score for name in plain)
 
 
-def test_metric_from_a_checkpoint(tmp_path):
+def test_metric_from_a_bare_checkpoint_says_that_it_is_raw(tmp_path, caplog):
     torch.manual_seed(3)
     model = RVTDetector(num_classes=3, **SETTINGS)
     torch.save({"state_dict": model.state_dict()}, tmp_path / "judge.ckpt")
-    metric = EventQualityScore(tmp_path / "judge.ckpt", **SETTINGS)
-    direct = EventQualityScore(backbone=model.backbone)
+    metric = EventQualityScore(tmp_path / "judge.ckpt", partition_split_32=1)
+    assert [record.message.count("has no centre: its scores are raw") for record in caplog.records]
+    direct = EventQualityScore(Judge.of(model.backbone))
     for each in (metric, direct):
         each.update(moving_edges(1), moving_edges(2))
+    assert len(caplog.records) == 2  # one for each metric, none for an update
     assert float(metric.compute()) == pytest.approx(float(direct.compute()), abs=1e-7)
-    assert len(metric.weights_sha256) == 64
-    with pytest.raises(ValueError, match=r"size small, got tiny; set eqs\.size"):
-        EventQualityScore(tmp_path / "judge.ckpt", partition_split_32=1)
-    with pytest.raises(ValueError, match=r"input channels 10, got 20; set eqs\.bins"):
-        EventQualityScore(tmp_path / "judge.ckpt", bins=5, **SETTINGS)
+    assert metric.weights_sha256 == direct.weights_sha256
+    assert metric.definition.architecture == "rvt-tiny-split1"
+    with pytest.raises(ValueError, match="Expected 10 bins, as the judge was trained with, got 5"):
+        EventQualityScore(tmp_path / "judge.ckpt", bins=5)
+
+
+def test_gradients_reach_the_times_of_events(judge):
+    """The loss through the soft histogram, as the documents show it."""
+    metric = EventQualityScore(Judge.of(judge), warmup_windows=0)
+    real, made = moving_edges(1), moving_edges(2)
+    times = torch.tensor(made.t, dtype=torch.float64, requires_grad=True)
+    places = [torch.from_numpy(getattr(made, name).astype(np.int64)) for name in "xyp"]
+
+    def histograms(t, x, y, p):
+        windows = []
+        for start in range(0, 150_000, 50_000):
+            inside = (t.detach() >= start) & (t.detach() < start + 50_000)
+            span = {"start_us": start, "stop_us": start + 50_000, "height": HEIGHT, "width": WIDTH}
+            windows.append(soft_histogram(t[inside], x[inside], y[inside], p[inside], **span))
+        return torch.stack(windows).float()
+
+    fixed = [torch.from_numpy(getattr(real, name).astype(np.int64)) for name in "xyp"]
+    target = histograms(torch.from_numpy(real.t).double(), *fixed)
+    before = metric.loss(histograms(times, *places), target)
+    before.backward()
+    assert times.grad.isfinite().all()
+    assert (times.grad != 0).sum() > 1000
+    moved = times.detach() - 200 * times.grad / times.grad.abs().max()
+    assert metric.loss(histograms(moved, *places), target) < before.item()
 
 
 def test_random_weights_are_seeded_and_leave_the_global_seed_alone():
     torch.manual_seed(5)
     expected = torch.rand(1)
     torch.manual_seed(5)
-    digests = [load_backbone("random", seed=seed, **SETTINGS)[1] for seed in (0, 0, 1)]
+    digests = [Judge.random(seed, **SETTINGS).weights_sha256 for seed in (0, 0, 1)]
     assert torch.rand(1) == expected
     assert digests[0] == digests[1] != digests[2]
 
 
 def test_missing_checkpoint_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"gone\.ckpt, got no file; set eqs\.weights"):
+    with pytest.raises(FileNotFoundError, match=r"gone\.ckpt, got no such file; set eqs\.judge"):
         EventQualityScore(tmp_path / "gone.ckpt")

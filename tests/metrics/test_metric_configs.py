@@ -1,31 +1,46 @@
-"""The metric's configuration files build what they say."""
+"""The metric's configuration files build what they say and offer every choice there is."""
 
 from pathlib import Path
 
-import numpy as np
+import pytest
+import yaml
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
-from eqs.metrics import Centre, Definition
+from eqs.metrics import Definition, Judge
+from eqs.metrics.definition import choices, kinds
 
 CONFIGS = Path(__file__).parents[2] / "eqs/configs"
+HEADLINE = Definition(features="centred")
 
 
-def build(name, *overrides):
+def build(name, *overrides, judge="random"):
     with initialize_config_dir(str(CONFIGS), version_base=None):
         cfg = compose(overrides=[f"+metric={name}", *overrides])
-    return instantiate(cfg.metric, weights="random", size="tiny")
+    return instantiate(cfg.eqs, judge=judge)
 
 
-def test_paper_reading():
+def test_the_paper_s_reading_is_the_raw_gate():
     metric = build("eqs_paper")
-    assert metric.definition == Definition(tap="gate", architecture="rvt-tiny-split2")
+    assert metric.definition == Definition(tap="gate", architecture="rvt-small-split2")
 
 
-def test_headline_reading(tmp_path):
-    means = tuple(np.ones(width, np.float32) for width in (32, 64, 128))
-    Centre(tap="hidden", stages=(1, 2, 3), means=means).save(tmp_path / "centre.npz")
-    metric = build("eqs", f"metric.centre={tmp_path / 'centre.npz'}", "metric.stages=[1,2]")
-    assert metric.definition == Definition(
-        features="centred", stages=(1, 2), architecture="rvt-tiny-split2"
-    )
+def test_without_choices_the_judge_decides(make_events, tmp_path):
+    recordings = [make_events(seed, height=32, width=32) for seed in (1, 2)]
+    judge = Judge.random(size="tiny").centred_on(recordings)
+    judge.save(tmp_path)
+    metric = build("eqs", judge=str(tmp_path))
+    assert metric.definition == Definition(features="centred", architecture="rvt-tiny-split2")
+    chosen = build("eqs", "eqs.stages=[1,2]", "eqs.features=raw", judge=str(tmp_path))
+    assert chosen.definition == Definition(stages=(1, 2), architecture="rvt-tiny-split2")
+
+
+@pytest.mark.parametrize("name", choices())
+def test_every_choice_stands_in_the_file_with_its_headline_and_its_values(name):
+    text = (CONFIGS / "metric" / "eqs.yaml").read_text()
+    assert yaml.safe_load(text)[name] is None
+    (line,) = (line for line in text.splitlines() if line.startswith(f"{name}:"))
+    shown = getattr(HEADLINE, name)
+    assert f"[{', '.join(map(str, shown)) if isinstance(shown, tuple) else shown}]" in line
+    for value in kinds().get(name, ()):
+        assert value in line

@@ -1,5 +1,7 @@
 """Streams cut into common windows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -15,9 +17,15 @@ def at(*times):
     return Events.from_arrays(t=times, x=zeros, y=zeros, p=zeros, height=4, width=6)
 
 
-def test_windows_cover_the_overlap_and_drop_the_remainder():
-    starts = window_starts([at(5, 100), at(20, 74, 90)], 10)
-    assert starts.tolist() == [20, 30, 40, 50, 60, 70, 80]
+def test_the_reference_sets_the_windows_and_the_remainder_is_dropped():
+    starts = window_starts([at(5, 74), at(20, 100)], 10)
+    assert starts.tolist() == [5, 15, 25, 35, 45, 55, 65]
+
+
+def test_a_stated_span_wins_over_events():
+    watched = replace(at(30, 40), span_us=(0, 60))
+    assert window_starts([watched, at(2, 90)], 20).tolist() == [0, 20, 40]
+    assert window_starts([at(5, 74), watched], 20).tolist() == [5, 25]
 
 
 def test_last_event_belongs_to_the_overlap():

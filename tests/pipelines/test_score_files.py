@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hydra import compose, initialize_config_dir
 
+from eqs.metrics import scoring
 from eqs.pipelines.score_files import score_files
 
 CONFIGS = Path(__file__).parents[2] / "eqs/configs"
@@ -26,7 +27,7 @@ def files(make_events, tmp_path):
 
 
 def run(simulated, real, out, *overrides):
-    given = [f"simulated={simulated}", f"real={real}", f"out={out}", "eqs.weights=random"]
+    given = [f"simulated={simulated}", f"real={real}", f"out={out}", "eqs.judge=random"]
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose("score", [*given, f"paths.runs={out}/runs", *overrides])
     score_files(cfg)
@@ -75,7 +76,32 @@ def test_a_missing_file_ends_in_one_sentence(files, tmp_path, caplog):
 
 def test_two_plain_arguments_are_the_files_even_if_they_are_one(files, tmp_path, monkeypatch):
     paths = [f"paths.{key}={tmp_path / key}" for key in ("runs", "results", "logs")]
-    given = [*map(str, (files[0], files[0])), "eqs.weights=random", f"out={tmp_path / 'out'}"]
+    given = [*map(str, (files[0], files[0])), "eqs.judge=random", f"out={tmp_path / 'out'}"]
     monkeypatch.setattr("sys.argv", ["score.py", *given, *paths])
-    runpy.run_path(str(CONFIGS.parent / "scripts" / "score.py"), run_name="__main__")
+    runpy.run_path(str(CONFIGS.parents[1] / "scripts" / "score.py"), run_name="__main__")
     assert json.loads((tmp_path / "out" / "score.json").read_text())["eqs"] == pytest.approx(1.0)
+
+
+def test_no_such_device_ends_in_one_sentence(files, tmp_path, caplog):
+    with pytest.raises(SystemExit):
+        run(files[1], files[0], tmp_path / "out", "device=cuda:99")
+    assert "Expected device auto, cpu or a GPU that is there, got 'cuda:99'" in caplog.text
+
+
+def test_windows_per_pass_are_those_asked_for(files, tmp_path, monkeypatch):
+    seen = []
+    plain = scoring.pooled_features
+
+    def watched(backbone, chunks, **given):
+        return plain(backbone, (seen.append(len(chunk)) or chunk for chunk in chunks), **given)
+
+    monkeypatch.setattr(scoring, "pooled_features", watched)
+    run(files[1], files[0], tmp_path / "out", "eqs.chunk_windows=3", "taps=[]")
+    assert max(seen) == 3
+
+
+def test_the_span_may_be_given_and_is_written_down(files, tmp_path):
+    run(files[1], files[0], tmp_path / "out", "start_us=500000", "stop_us=1520000", "taps=[]")
+    found = json.loads((tmp_path / "out" / "score.json").read_text())
+    assert found["span_us"] == [500_000, 1_500_000]
+    assert found["windows"] == 15

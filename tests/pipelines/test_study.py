@@ -1,9 +1,12 @@
 """The whole chain through the real configuration, on a world of a few tiny sequences."""
 
 import json
+import re
 import runpy
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from hydra import compose, initialize_config_dir
@@ -13,12 +16,15 @@ from PIL import Image
 
 import eqs
 from eqs.data import RecordedEvents
+from eqs.metrics import Definition, Judge
 from eqs.pipelines import evaluate, register_resolvers, train
 from eqs.pipelines.build import dataset
+from eqs.pipelines.judge import KEPT_TAPS, find_scoring
 from eqs.pipelines.reverse import reverse_precision
-from eqs.pipelines.runs import finished_runs
+from eqs.pipelines.runs import Run, finished_runs
 
 CONFIGS = Path(eqs.__file__).parent / "configs"
+README = Path(__file__).parents[2] / "README.md"
 
 
 class Interrupted(Exception):
@@ -63,6 +69,10 @@ def configured(place: Path, *overrides: str, name: str = "train") -> DictConfig:
     with open_dict(cfg):
         cfg.callbacks = {}
     return cfg
+
+
+def runs_of(place: Path) -> list[Run]:
+    return list(finished_runs(place / "runs/dsec_mini_smoke"))
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +145,7 @@ def test_detections_are_filmed(
     monkeypatch.setattr(
         "sys.argv", ["watch.py", str(run), str(recording), str(out), "--min-score", "0"]
     )
-    runpy.run_path(str(CONFIGS.parent / "scripts" / "watch.py"), run_name="__main__")
+    runpy.run_path(str(README.parent / "scripts" / "watch.py"), run_name="__main__")
     with Image.open(out) as film:
         assert (film.width, film.height) == (4 * 64, 4 * 48)
         film.seek(film.n_frames - 1)
@@ -152,6 +162,50 @@ def test_the_reverse_mAP_of_real_events_is_the_forward_one(
     data = dataset(configured(place, name="evaluate"))
     found = reverse_precision(runs["real"], data, {"again": RecordedEvents()})
     assert found == {"again": trained["real"]["real"]["map"]}
+
+
+@pytest.mark.slow
+def test_training_on_real_events_leaves_a_judge(place: Path, trained: dict[str, dict]) -> None:
+    folders = {run.result()["simulator"]: run.folder for run in runs_of(place)}
+    assert not (folders["esim"] / "judge.json").exists()
+    judge = Judge.load(folders["real"])
+    assert judge.definition == Definition(features="centred", architecture="rvt-tiny-split1")
+    assert {centre.tap for centre in judge.centres} == set(KEPT_TAPS)
+    assert judge.description.endswith("of dsec_mini_smoke, a rendered world")
+    (folders["real"] / "judge.json").unlink()  # as older runs have none
+    again = find_scoring(configured(place, name="evaluate"), None).judge
+    assert [c.sha256 for c in again.centres] == [c.sha256 for c in judge.centres]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reading", ["eqs", "eqs_paper"])
+def test_the_readme_s_snippet_gives_the_study_s_row(
+    place: Path,
+    trained: dict[str, dict],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    reading: str,
+) -> None:
+    cfg = configured(place, "score=true", f"metric={reading}", name="evaluate")
+    evaluate(cfg)
+    rows = pd.read_csv(place / "results/dsec_mini_smoke/eqs.csv").query("system == 'esim'")
+    (run,) = (run for run in runs_of(place) if run.result()["simulator"] == "real")
+    blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
+    (snippet,) = (block for block in blocks if "EventQualityScore" in block)
+    if reading == "eqs_paper":
+        snippet = snippet.replace('Score("judge")', 'Score("judge", tap="gate", features="raw")')
+    monkeypatch.chdir(tmp_path)
+    Path("judge").symlink_to(run.folder)
+    for recording in dataset(cfg).recordings("test"):
+        shutil.copy(recording.events_path, "events.h5")
+        count = len(recording.frame_times_us)
+        frames = np.stack([recording.read_frame(index) for index in range(count)])
+        made = {"frames": frames, "timestamps_us": recording.frame_times_us}
+        exec(snippet, made)
+        expected = rows.set_index("sequence").loc[recording.name, "eqs"]
+        assert made["score"].compute().item() == pytest.approx(expected, abs=1e-6)
+        assert f"tensor({made['score'].compute():.4f}" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -1,0 +1,119 @@
+"""Which detector judges, where several could."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+import torch
+from hydra import compose, initialize_config_dir
+
+from eqs.files import write_json
+from eqs.metrics import EventQualityScore, Judge
+from eqs.models import RVTDetector
+from eqs.pipelines import judge
+from eqs.pipelines.build import dataset
+from eqs.pipelines.runs import Run, recipe_hash
+
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
+ACCURACY = {"own": {}, "real": {}, "protocol": {}}
+
+
+@pytest.fixture
+def cfg(tmp_path):
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        return compose("evaluate", [f"paths.runs={tmp_path}"])
+
+
+def finished(root, name, *, simulator="real", recipe="old", age_s=0):
+    folder = root / "dsec_mini" / simulator / name
+    folder.mkdir(parents=True)
+    result = {"simulator": simulator, "system": simulator, "seed": 0, "recipe": recipe, **ACCURACY}
+    write_json(folder / "result.json", result)
+    os.utime(folder / "result.json", (1e9 - age_s, 1e9 - age_s))
+    return Run(folder)
+
+
+@pytest.fixture
+def chosen(cfg, monkeypatch):
+    monkeypatch.setattr(judge, "judge_of", lambda run: run)
+    monkeypatch.setattr(judge, "_data_of", lambda run: None)
+    return lambda: judge.find_judge(cfg, None)[0]
+
+
+def test_the_configured_recipe_wins_over_a_newer_one(cfg, chosen, tmp_path):
+    wanted = finished(tmp_path, "a", recipe=recipe_hash(cfg), age_s=100)
+    finished(tmp_path, "b")
+    assert chosen() == wanted
+
+
+def test_else_the_newest_wins(chosen, tmp_path):
+    finished(tmp_path, "a", age_s=100)
+    wanted = finished(tmp_path, "b")
+    finished(tmp_path, "c", age_s=50)
+    assert chosen() == wanted
+
+
+def test_detectors_of_simulated_streams_do_not_judge(chosen, tmp_path):
+    finished(tmp_path, "a", simulator="esim")
+    with pytest.raises(ValueError, match="Expected a judge trained on real events, got none"):
+        chosen()
+
+
+@pytest.mark.parametrize(
+    ("features", "expected"),
+    [
+        ("centred", "hidden_centred hidden_raw gate_centred gate_raw"),
+        ("raw", "hidden_raw hidden_centred gate_raw gate_centred"),
+        (
+            "whitened",
+            "hidden_whitened hidden_raw hidden_centred gate_whitened gate_raw gate_centred",
+        ),
+    ],
+)
+def test_whitened_readings_appear_when_asked_for(features, expected, make_events):
+    recording = make_events(3000, 32, 32)
+    trained = Judge.random(size="tiny").centred_on([recording], ["hidden", "gate"])
+    metric = EventQualityScore(trained, features=features)
+    readings = judge.readings_of(metric, ["hidden", "gate"])
+    assert [reading.name for reading in readings] == expected.split()
+
+
+def test_a_given_folder_is_the_judge(tmp_path, make_events):
+    Judge.random(size="tiny").centred_on([make_events(3000, 32, 32)]).save(tmp_path / "mine")
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("evaluate", [f"eqs.judge={tmp_path / 'mine'}", f"paths.runs={tmp_path}"])
+        gate = compose("evaluate", [f"eqs.judge={tmp_path / 'mine'}", "eqs.tap=gate"])
+    found = judge.find_scoring(cfg, None)
+    assert found.headline.name == "hidden_centred"
+    assert found.judge.weights_sha256 == Judge.load(tmp_path / "mine").weights_sha256
+    names = {reading.name for reading in found.readings}
+    assert names == {"hidden_centred", "hidden_raw", "gate_raw", "downsample_raw"}
+    with pytest.raises(ValueError, match=r"centre of the activation gate.* set eqs\.judge, or"):
+        judge.find_scoring(gate, None)
+
+
+def test_a_checkpoint_is_centred_on_the_training_recordings_and_kept(tmp_path, make_recording):
+    for split in ("train", "test"):
+        make_recording(tmp_path / "data" / split / f"{split}_a", height=32, width=32)
+    torch.manual_seed(0)
+    detector = RVTDetector("tiny", partition_split_32=1)
+    torch.save({"state_dict": detector.state_dict()}, tmp_path / "some.ckpt")
+    given = [
+        f"eqs.judge={tmp_path / 'some.ckpt'}",
+        "eqs.partition_split_32=1",
+        f"paths.results={tmp_path / 'results'}",
+        "data=dsec",
+        f"data.root={tmp_path / 'data'}",
+        "data.size=32x32",
+        "data.crop_rows=null",
+        "data.splits={train: [train_a], val: [], test: [test_a]}",
+    ]
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("evaluate", given)
+    found = judge.find_scoring(cfg, dataset(cfg))
+    (kept,) = (tmp_path / "results" / "dsec").glob("judge-*")
+    assert Judge.load(kept).reading().centre.sha256 == found.headline.centre.sha256
+    shutil.rmtree(tmp_path / "data" / "train")
+    again = judge.find_scoring(cfg, None)
+    assert again.headline.centre.sha256 == found.headline.centre.sha256
