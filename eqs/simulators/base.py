@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 
 from eqs.events import Events
 from eqs.frames import GreyImage, Interpolation
-from eqs.simulators.readout import Readout
-from eqs.simulators.stream import Pixels, Stream
+from eqs.simulators.streaming.pixels import Pixels
+from eqs.simulators.streaming.readout import Readout
+from eqs.simulators.streaming.stream import Stream
 
 MODES = ("fixed", "faithful")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Simulator(ABC):
+class Simulator:
     """A model of an event camera that sees a clip of frames.
 
-    A subclass is a frozen dataclass of parameters with units in their names, and a `begin` that
-    makes the pixels. All checking, conversion to grey, sorting and chunking happens here.
+    A subclass is a frozen dataclass of parameters with units in their names, and names the pixels
+    that they describe, one class for each mode. All checking, conversion to grey, sorting and
+    chunking happens here.
 
     Convention: frames are grey or RGB with levels 0..255, their times int64 microseconds; event
     times are floored to whole microseconds; the stream is ordered by (t, y, x, ordinal). The first
@@ -38,6 +40,8 @@ class Simulator(ABC):
     """
 
     name: ClassVar[str]
+    pixels: ClassVar[Mapping[str, Callable[[Any, GreyImage, str], Pixels]]]
+    """Makes the pixels, by mode, from the simulator, the first image and the sequence's name."""
     version: ClassVar[int] = 1
     """Raised whenever equal parameters begin to give other events."""
     rounds_luma: ClassVar[bool] = True
@@ -61,9 +65,9 @@ class Simulator(ABC):
         """Whether the events depend on the seed."""
         return False
 
-    @abstractmethod
     def begin(self, image: GreyImage, sequence: str) -> Pixels:
         """The pixels after the first frame of a sequence."""
+        return self.pixels[self.mode](self, image, sequence)
 
     def parameters(self) -> dict[str, Any]:
         """Everything that changes the events; what is not used is left out."""

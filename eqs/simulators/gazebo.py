@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.base import Simulator, require_positive
-from eqs.simulators.ordering import event_key
-from eqs.simulators.stream import Interval
+from eqs.simulators.streaming.keys import event_key
+from eqs.simulators.streaming.pixels import Interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,15 +52,11 @@ class Gazebo(Simulator):
         super().__post_init__()
         require_positive(self, "threshold_level")
 
-    def begin(self, image: GreyImage, sequence: str) -> GazeboPixels:
-        """The pixels after the first frame."""
-        return GazeboPixels(self, image)
-
 
 class GazeboPixels:
     """The grey level of each pixel's last event."""
 
-    def __init__(self, model: Gazebo, image: GreyImage) -> None:
+    def __init__(self, model: Gazebo, image: GreyImage, sequence: str) -> None:
         """Settle on the first image."""
         self.model = model
         self.reference = image.levels[image.codes]
@@ -99,3 +95,6 @@ def _fire(
             reference[pixel] = levels[codes[pixel]]
             count += 1
     return count
+
+
+Gazebo.pixels = dict.fromkeys(("fixed", "faithful"), GazeboPixels)

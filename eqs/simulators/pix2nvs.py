@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
 from eqs.simulators.base import Simulator, require_positive
-from eqs.simulators.ordering import event_key, with_room
-from eqs.simulators.stream import Interval
+from eqs.simulators.streaming.keys import event_key, with_room
+from eqs.simulators.streaming.pixels import Interval
 
 REFERENCE_UPDATES = ("previous", "replace", "integrate", "never")
 BLOCKS = (1, 2, 4)
@@ -103,10 +103,6 @@ class PIX2NVS(Simulator):
         if self.block not in BLOCKS:
             raise ValueError(f"Expected block 1, 2 or 4, got {self.block}; set sim.block")
 
-    def begin(self, image: GreyImage, sequence: str) -> PIX2NVSPixels:
-        """The pixels after the first frame."""
-        return PIX2NVSPixels(self, image)
-
 
 def log_luma(levels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Natural log of the grey level, black counted as level 1.
@@ -121,7 +117,7 @@ def log_luma(levels: NDArray[np.float64]) -> NDArray[np.float64]:
 class PIX2NVSPixels:
     """References and thresholds of all pixels."""
 
-    def __init__(self, model: PIX2NVS, image: GreyImage) -> None:
+    def __init__(self, model: PIX2NVS, image: GreyImage, sequence: str) -> None:
         """Settle on the first image."""
         self.model = model
         self.update = REFERENCE_UPDATES.index(model.reference_update)
@@ -288,3 +284,6 @@ def _fire(
         elif update == _INTEGRATE:
             reference[pixel] += number * limit
         threshold[pixel] = min(limit * (1.0 + adaptation), largest_log)
+
+
+PIX2NVS.pixels = dict.fromkeys(("fixed", "faithful"), PIX2NVSPixels)

@@ -12,6 +12,7 @@ import pytest
 
 from eqs.events import Events
 from eqs.frames import LinearInterpolation
+from eqs.processors import useful_bands
 from eqs.simulators import (
     CARLA,
     ESIM,
@@ -26,7 +27,6 @@ from eqs.simulators import (
     RowReadout,
     Vid2E,
 )
-from eqs.simulators.bands import useful_bands
 
 SIMULATORS = [
     ESIM(),
@@ -117,7 +117,9 @@ def test_bands_of_any_height_give_the_same_events(simulator, dtype, walk, monkey
     frames, times = walk[0].astype(dtype), walk[1]
     whole = simulator.simulate(frames, times)
     for bands in (2, 3, 5):
-        monkeypatch.setattr("eqs.simulators.stream.useful_bands", lambda _, bands=bands: bands)
+        monkeypatch.setattr(
+            "eqs.simulators.streaming.stream.useful_bands", lambda _, bands=bands: bands
+        )
         assert_same(whole, simulator.simulate(frames, times))
         assert_same(whole, chunked(simulator, frames, times, [4, 5]))
 
@@ -129,7 +131,9 @@ def test_bands_know_of_frames_between_readouts_and_pickles(simulator, walk, monk
         simulator, interpolation=LinearInterpolation(factor=2), readout=RowReadout()
     )
     whole = simulator.simulate(frames, times)
-    monkeypatch.setattr("eqs.simulators.stream.useful_bands", lambda _: 99)  # more than rows
+    monkeypatch.setattr(
+        "eqs.simulators.streaming.stream.useful_bands", lambda _: 99
+    )  # more than rows
     stream = simulator.start()
     first = stream.step(frames[:9], times[:9])
     stream = pickle.loads(pickle.dumps(stream))
@@ -139,7 +143,7 @@ def test_bands_know_of_frames_between_readouts_and_pickles(simulator, walk, monk
 
 
 def test_small_sensors_are_left_whole_and_large_ones_use_the_cores(monkeypatch):
-    monkeypatch.setattr("eqs.simulators.bands.available_cores", lambda: 6)
+    monkeypatch.setattr("eqs.processors.available_cores", lambda: 6)
     assert [useful_bands(h * w) for h, w in ((96, 128), (260, 346), (480, 640))] == [1, 2, 6]
 
 

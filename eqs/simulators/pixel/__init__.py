@@ -1,0 +1,1 @@
+"""What the pixels of several models are made of: light, thresholds, crossings, noise, draws."""
