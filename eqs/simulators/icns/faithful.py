@@ -33,7 +33,7 @@ class FaithfulICNSPixels:
         self.tau_us = self._time_constants(self.voltage)
         self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
         self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
-        self.refractory_until_us = np.full(self.voltage.size, SEEING)
+        self.ready_us = np.full(self.voltage.size, SEEING)
         on_hz, off_hz = model.background_hz(image)
         self.on_us, self.on_period_us = self._background(on_hz, "on")
         self.off_us, self.off_period_us = self._background(off_hz, "off")
@@ -68,7 +68,7 @@ class FaithfulICNSPixels:
             self.voltage,
             self.reset,
             self.tau_us,
-            self.refractory_until_us,
+            self.ready_us,
             (self.on, self.off),
             (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
             (float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
@@ -115,7 +115,7 @@ def _fire(
     voltage: NDArray[np.float64],
     reset: NDArray[np.float64],
     tau_us: NDArray[np.float64],
-    refractory_until_us: NDArray[np.float64],
+    ready_us: NDArray[np.float64],
     thresholds: tuple[NDArray[np.float64], NDArray[np.float64]],
     drawn: tuple[float, float, float],
     delays: tuple[float, float, float],
@@ -134,10 +134,10 @@ def _fire(
             tau_us[pixel] = time_constants[codes[pixel]]
         tau, level, ordinal = tau_us[pixel], voltage[pixel], 0
         pixel_key = word_at(frame_key, pixel)
-        if SEEING < refractory_until_us[pixel] < stop_us:
-            level = _follow(level, target, (refractory_until_us[pixel] - now_us) / tau)
-            now_us, reset[pixel], refractory_until_us[pixel] = (
-                refractory_until_us[pixel],
+        if SEEING < ready_us[pixel] < stop_us:
+            level = _follow(level, target, (ready_us[pixel] - now_us) / tau)
+            now_us, reset[pixel], ready_us[pixel] = (
+                ready_us[pixel],
                 level,
                 SEEING,
             )
@@ -150,7 +150,7 @@ def _fire(
                 count += 1
                 level = reset[pixel] = target
                 background_us[off_side][pixel] += periods_us[off_side][pixel]
-        while refractory_until_us[pixel] == SEEING and level != target:
+        while ready_us[pixel] == SEEING and level != target:
             change = _follow(level, target, (stop_us - now_us) / tau) - reset[pixel]
             if target == 0.0:
                 change = -reset[pixel]
@@ -167,11 +167,11 @@ def _fire(
             ordinal += 1
             side, mean = (on, drawn[0]) if up else (off, drawn[1])
             redraw(side, pixel, mean, drawn[2], 0.0, word_at(word, 1))
-            refractory_until_us[pixel] = event_us + delays[2]
-            if refractory_until_us[pixel] < stop_us:
-                level = _follow(level, target, (refractory_until_us[pixel] - now_us) / tau)
-                now_us, reset[pixel], refractory_until_us[pixel] = (
-                    refractory_until_us[pixel],
+            ready_us[pixel] = event_us + delays[2]
+            if ready_us[pixel] < stop_us:
+                level = _follow(level, target, (ready_us[pixel] - now_us) / tau)
+                now_us, reset[pixel], ready_us[pixel] = (
+                    ready_us[pixel],
                     level,
                     SEEING,
                 )

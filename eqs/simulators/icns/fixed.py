@@ -36,7 +36,7 @@ class ICNSPixels:
         self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
         self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
         self.background = model.background_hz(image)
-        self.refractory_until_us = np.full(self.voltage.size, SEEING)
+        self.ready_us = np.full(self.voltage.size, SEEING)
         self.keys = np.empty(self.voltage.size, np.int64)
 
     def _thresholds(self, mean_log: float, name: str, image: GreyImage) -> NDArray[np.float64]:
@@ -54,7 +54,7 @@ class ICNSPixels:
         self.keys, count = _fire(
             before,
             self.seen,
-            (self.voltage, self.reset, self.refractory_until_us),
+            (self.voltage, self.reset, self.ready_us),
             (self.on, self.off),
             (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
             (float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
@@ -98,7 +98,7 @@ def _fire(
     stop_us: float,
     keys: NDArray[np.int64],
 ) -> Fired:
-    voltage, reset, refractory_until_us = state
+    voltage, reset, ready_us = state
     on, off = thresholds
     count = 0
     for pixel in range(voltage.size):
@@ -112,12 +112,12 @@ def _fire(
         pixel_key, ordinal = word_at(frame_key, pixel), 0
         while True:
             light = first + slope * (now_us - start_us)
-            if refractory_until_us[pixel] != SEEING:
-                if refractory_until_us[pixel] >= stop_us:
+            if ready_us[pixel] != SEEING:
+                if ready_us[pixel] >= stop_us:
                     break
-                level = response(level, light, slope, tau_us, refractory_until_us[pixel] - now_us)
-                now_us, reset[pixel], refractory_until_us[pixel] = (
-                    refractory_until_us[pixel],
+                level = response(level, light, slope, tau_us, ready_us[pixel] - now_us)
+                now_us, reset[pixel], ready_us[pixel] = (
+                    ready_us[pixel],
                     level,
                     SEEING,
                 )
@@ -146,7 +146,7 @@ def _fire(
             keys = with_room(keys, count + 1)
             keys[count] = event_key(int(event_us), pixel, 1 if up else 0)
             count += 1
-            refractory_until_us[pixel] = event_us + delays[2]
+            ready_us[pixel] = event_us + delays[2]
         light = first + slope * (now_us - start_us)
         voltage[pixel] = response(level, light, slope, tau_us, stop_us - now_us)
     return keys, count

@@ -32,10 +32,10 @@ class ImprovedESIMPixels:
         if model.leaks:
             key = draw_key(seed, "leak phase", sequence, first_pixel=first_pixel)
             self.above = self.on * uniform_map(key, pixels)
-        self.refractory_until_us = np.zeros(pixels)
+        self.ready_us = np.zeros(pixels)
         if model.refractory_us > 0 and not model.leaks:
             key = draw_key(seed, "first blindness", sequence, first_pixel=first_pixel)
-            self.refractory_until_us = model.refractory_us * uniform_map(key, pixels)
+            self.ready_us = model.refractory_us * uniform_map(key, pixels)
         self.keys = np.empty(pixels, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
@@ -46,7 +46,7 @@ class ImprovedESIMPixels:
             before,
             after,
             self.above,
-            self.refractory_until_us,
+            self.ready_us,
             self.on,
             self.off,
             self.model.leak_hz * MICROSECONDS if self.model.leaks else 0.0,
@@ -63,7 +63,7 @@ def _fire(
     before: NDArray[np.float64],
     after: NDArray[np.float64],
     above: NDArray[np.float64],
-    refractory_until_us: NDArray[np.float64],
+    ready_us: NDArray[np.float64],
     on: NDArray[np.float64],
     off: NDArray[np.float64],
     leaks_per_us: float,
@@ -80,8 +80,8 @@ def _fire(
         polarity = 1 if slope > 0 else 0
         step = on[pixel] if polarity else -off[pixel]
         while True:
-            if refractory_until_us[pixel] > start_us + offset_us:
-                offset_us, distance = refractory_until_us[pixel] - start_us, 0.0
+            if ready_us[pixel] > start_us + offset_us:
+                offset_us, distance = ready_us[pixel] - start_us, 0.0
             if offset_us >= span_us:
                 break
             wait_us = max((step - distance) / slope, 0.0) if slope != 0.0 else np.inf
@@ -93,6 +93,6 @@ def _fire(
             keys = with_room(keys, count + 1)
             keys[count] = event_key(start_us + int(offset_us), pixel, polarity)
             count += 1
-            refractory_until_us[pixel] = start_us + offset_us + refractory_us
+            ready_us[pixel] = start_us + offset_us + refractory_us
         above[pixel] = distance
     return keys, count

@@ -115,7 +115,8 @@ def fire_levels(
         on: threshold of each pixel.
         off: the same for OFF, positive.
         refractory_us: refractory period after an event.
-        keeps_contrast: whether a crossing within the refractory period waits for its end, or is lost.
+        keeps_contrast: whether a crossing within the refractory period waits for its end or is
+            lost.
         start_us: start of the interval.
         span_us: its length.
         keys: buffer for the events, large enough for all levels passed.
@@ -139,7 +140,7 @@ def fire_levels(
                 if not keeps_contrast:
                     settled = ordinal
                     continue
-                # The signal of the interval is still beyond the level when the refractory period ends.
+                # The signal is still beyond the level when the refractory period ends.
                 offset_us = earliest_us
             if offset_us > span_us:
                 break

@@ -51,7 +51,7 @@ def test_random_walks_with_blindness_agree_with_a_scalar_model(walk):
     frames, times = walk
     times = times - times[0]
     model = ImprovedESIM(order=0, threshold_off_log=0.2, refractory_us=9000)
-    blind = model.begin(GreyImage.from_frame(frames[0]), "").refractory_until_us.reshape(16, 16)
+    blind = model.begin(GreyImage.from_frame(frames[0]), "").ready_us.reshape(16, 16)
     expected = scalar_improved(frames, times, model, blind)
     assert_agree(model.simulate(frames, times), expected, 1000)
 
