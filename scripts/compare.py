@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.table import Table
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from eqs.drawing import learning_curves, save_figure
 from eqs.pipelines import Run
-from eqs.study import learning_curves, save_figure
 
 SHOWN = ("model", "recipe", "task")  # parts of a configuration in which trainings differ
 MEASURED = "val/map"
@@ -70,12 +70,11 @@ def main() -> None:
             for name in sorted(own.keys() | first.keys())
             if own.get(name) != first.get(name)
         ]
-        result = run.result()
-        place = f"{len(names) + 1}: {result['system']} seed {result['seed']}"
+        result, real = run.result, run.result.real
+        place = f"{len(names) + 1}: {result.system} seed {result.seed}"
         names.append(", ".join([place, *changed]))
-        real = result["real"]
-        minutes = f"{result['seconds'] / 60:.1f}"
-        table.add_row(names[-1], f"{100 * real['map']:.1f}", f"{100 * real['map_50']:.1f}", minutes)
+        minutes = f"{result.seconds / 60:.1f}"
+        table.add_row(names[-1], f"{100 * real.map:.1f}", f"{100 * real.map_50:.1f}", minutes)
     Console().print(table)
     if given.curve:
         labels = [shorten(name, 60, placeholder=" ...") for name in names]

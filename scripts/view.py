@@ -4,8 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from eqs.drawing import event_pictures, write_film
 from eqs.events import EventReader
-from eqs.study import event_pictures, write_film
 
 
 def main() -> None:

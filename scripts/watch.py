@@ -8,9 +8,9 @@ import numpy as np
 from hydra.utils import instantiate
 
 from eqs.data import Recording
+from eqs.drawing import event_picture, with_boxes, write_film
 from eqs.events import EventReader
 from eqs.pipelines import Run, detections_over
-from eqs.study import event_picture, with_boxes, write_film
 
 
 def film(
@@ -21,7 +21,7 @@ def film(
     protocol, window_us = instantiate(config.protocol), config.datamodule.window_us
     times_us = recording.frame_times_us[1:]
     pictures = []
-    found = detections_over(run, recording, events_path, protocol, min_score)
+    found = detections_over(run, recording, events_path, protocol)
     with EventReader(events_path, recording.height, recording.width) as events:
         for time_us, boxes in zip(times_us.tolist(), found, strict=True):
             if time_us > times_us[0] + 1e6 * seconds:

@@ -1,5 +1,6 @@
 """Scores: the Event Quality Score of two streams, and the mean average precision of detections."""
 
+from eqs.metrics.accuracy import Accuracy
 from eqs.metrics.battery import EXPECTED_ORDER, GRADED, anchors, singles
 from eqs.metrics.centre import Centre, feature_centres
 from eqs.metrics.definition import ACTIVATIONS, Definition
@@ -16,6 +17,7 @@ __all__ = [
     "ACTIVATIONS",
     "EXPECTED_ORDER",
     "GRADED",
+    "Accuracy",
     "Centre",
     "Definition",
     "EventQualityScore",

@@ -3,7 +3,6 @@
 from eqs.pipelines.calibrate import calibrate
 from eqs.pipelines.command import keys_explained
 from eqs.pipelines.detections import detections_over
-from eqs.pipelines.drawing import DetectionPictures
 from eqs.pipelines.evaluate import evaluate
 from eqs.pipelines.prepare import prepare
 from eqs.pipelines.resolvers import register_resolvers
@@ -15,7 +14,6 @@ from eqs.pipelines.train import train
 register_resolvers()
 
 __all__ = [
-    "DetectionPictures",
     "Run",
     "calibrate",
     "detections_over",

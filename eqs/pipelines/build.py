@@ -7,17 +7,32 @@ from pathlib import Path
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from eqs.data import DSECFolder, EventSource, RecordedEvents, RecordingFolder, SimulatedEvents
+from eqs.data import (
+    DSECFolder,
+    EventSource,
+    RecordedEvents,
+    RecordingFolder,
+    SimulatedEvents,
+)
 from eqs.simulators import Simulator
 
 Dataset = DSECFolder | RecordingFolder
 
 
 def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:
-    """The events a configured simulator makes, or the recorded ones where it is none."""
+    """The events a configured simulator makes, or the recorded ones.
+
+    Raises:
+        ValueError: it is neither.
+    """
     built = instantiate(simulator)
+    if isinstance(built, RecordedEvents):
+        return built
     if not isinstance(built, Simulator):
-        return RecordedEvents()
+        raise ValueError(
+            f"Expected a simulator or the recorded events, got a {type(built).__name__} from "
+            f"{simulator.get('_target_')}; set sim=esim, sim=real or another of configs/sim"
+        )
     return SimulatedEvents(built, Path(cfg.paths.simulated) / cfg.data.name)
 
 

@@ -7,28 +7,25 @@ from pathlib import Path
 
 import torch
 
-from eqs.data import Binning, EvaluationDataset, LabelProtocol, Recording, WindowSource
-from eqs.models import Detections, RVTDetector, postprocess
+from eqs.data import LabelProtocol, Recording
+from eqs.drawing import Boxes
+from eqs.models import RVTDetector
 from eqs.pipelines.runs import Run
-from eqs.study import Boxes
-from eqs.tasks import large_detections
+from eqs.training import Binning, EvaluationDataset, Selection, WindowSource, boxes_of
 
 
 def detections_over(
-    run: Run,
-    recording: Recording,
-    events_path: Path,
-    protocol: LabelProtocol,
-    min_score: float = 0.1,
+    run: Run, recording: Recording, events_path: Path, protocol: LabelProtocol
 ) -> Iterator[Boxes]:
     """Detections at the second, third, ... frame, each after everything before it was seen.
+
+    They are those that would enter the mAP of the run under the protocol, with its thresholds.
 
     Args:
         run: a finished training.
         recording: frame times and size.
         events_path: the events to look at, recorded or simulated.
-        protocol: gives the rows that are used, and whether small detections drop out.
-        min_score: objectness times class confidence from which on a detection counts.
+        protocol: gives the rows that are used, the score, and whether small detections drop out.
     """
     config = run.config()
     binning = Binning(
@@ -42,6 +39,7 @@ def detections_over(
     model = RVTDetector.from_checkpoint(
         run.weights, partition_split_32=config.model.partition_split_32
     ).eval()
+    selection = Selection(protocol, config.task.confidence_threshold, config.task.nms_threshold)
     states = None
     chunks = EvaluationDataset([source], chunk_length=10)
     for chunk in range(len(chunks)):
@@ -49,16 +47,4 @@ def detections_over(
             histograms = chunks[chunk]["histograms"].float()
             maps, states = model.backbone.forward_sequence(histograms, states)
             predictions = model.detect([stage.flatten(0, 1) for stage in maps])
-            found = postprocess(predictions, min_score)
-        if protocol.filter_detections:
-            found = [large_detections(each, protocol, recording.width) for each in found]
-        yield from map(boxes_of, found)
-
-
-def boxes_of(found: Detections) -> Boxes:
-    """Detections of one frame, from any device and precision, ready to be drawn."""
-    return Boxes(
-        corners=found["boxes"].float().cpu().numpy(),
-        labels=found["labels"].cpu().numpy(),
-        scores=found["scores"].float().cpu().numpy(),
-    )
+        yield from map(boxes_of, selection(predictions, recording.width))

@@ -60,33 +60,32 @@ def comparable_runs(cfg: DictConfig) -> list[Run]:
     """The finished runs that followed the configured recipe; others are named and left out."""
     recipe = recipe_hash(cfg)
     found = list(finished_runs(Path(cfg.paths.runs) / cfg.data.name))
-    kept = [run for run in found if run.result()["recipe"] == recipe]
+    kept = [run for run in found if run.result.recipe == recipe]
     if len(kept) < len(found):
-        others = Counter(run.result()["recipe"] for run in found if run not in kept)
+        others = Counter(run.result.recipe for run in found if run not in kept)
         log.info("left out %d run(s) of other recipes: %s", others.total(), ", ".join(others))
     return kept
 
 
 def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
     """One row per run, as `study.csv` wants it."""
-    names = short_names([(run.result()["simulator"], run.result()["system"]) for run in runs])
+    names = short_names([(run.result.simulator, run.result.system) for run in runs])
     rows = []
     for run in runs:
-        result = run.result()
-        own, real = result["own"], result["real"]
+        result, own, real = run.result, run.result.own, run.result.real
         rows.append(
             {
-                "simulator": result["simulator"],
-                "system": names[result["system"]],
-                "seed": result["seed"],
-                "map_sim": own["map"],
-                "map50_sim": own["map_50"],
-                "map_real": real["map"],
-                "map50_real": real["map_50"],
-                **{f"ap_sim_{name}": value for name, value in own["map_per_class"].items()},
-                **{f"ap_real_{name}": value for name, value in real["map_per_class"].items()},
-                "protocol": result["protocol"]["hash"],
-                "recipe": result["recipe"],
+                "simulator": result.simulator,
+                "system": names[result.system],
+                "seed": result.seed,
+                "map_sim": own.map,
+                "map50_sim": own.map_50,
+                "map_real": real.map,
+                "map50_real": real.map_50,
+                **{f"ap_sim_{name}": value for name, value in own.map_per_class.items()},
+                **{f"ap_real_{name}": value for name, value in real.map_per_class.items()},
+                "protocol": result.protocol["hash"],
+                "recipe": result.recipe,
             }
         )
     return rows
@@ -113,13 +112,13 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     table = eqs_table(rows)
     with times.measure("reverse mAP"):
         study = with_reverse(study_rows(runs), runs, data, systems)
-    names = short_names([(run.result()["simulator"], run.result()["system"]) for run in runs])
+    names = short_names([(run.result.simulator, run.result.system) for run in runs])
     found = Findings(
         recordings=recordings,
         judge=scoring.judge,
         headline=scoring.headline,
         systems=systems,
-        runs={names[run.result()["system"]]: run for run in runs},
+        runs={names[run.result.system]: run for run in runs},
         scores=scores,
         eqs=table,
         study=study_table(study, table) if runs else None,
@@ -146,7 +145,7 @@ def with_reverse(
     systems: Mapping[str, EventSource],
 ) -> list[dict[str, Any]]:
     """Rows of `study.csv` with the mAP that the real-trained detector of the same seed reaches."""
-    real = {run.result()["seed"]: run for run in runs if run.result()["simulator"] == "real"}
+    real = {run.result.seed: run for run in runs if run.result.simulator == "real"}
     found = {seed: reverse_precision(run, data, systems) for seed, run in real.items()}
     return [
         {**row, f"{BASELINE}reverse_map": found.get(row["seed"], {}).get(row["system"], math.nan)}

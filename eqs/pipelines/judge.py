@@ -104,10 +104,10 @@ def find_judge(cfg: DictConfig, data: Dataset | None) -> tuple[Judge, Path, Data
         return _given_judge(cfg, data)
     for name in dict.fromkeys([cfg.data.name, EMBEDDED_DATA]):
         found = finished_runs(Path(cfg.paths.runs) / name)
-        trained = [run for run in found if run.result()["simulator"] == "real"]
+        trained = [run for run in found if run.result.simulator == "real"]
         if trained:
             recipe = recipe_hash(cfg)
-            ranks = {(run.result()["recipe"] == recipe, run.finished_ns): run for run in trained}
+            ranks = {(run.result.recipe == recipe, run.finished_ns): run for run in trained}
             run = ranks[max(ranks)]
             if name != cfg.data.name:
                 log.warning(

@@ -13,6 +13,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from eqs.data import DSECFolder, EventSource, LabelProtocol, RecordedEvents, Recording
+from eqs.drawing import detection_panels, event_rate, events_panels, rate_curves, score_maps
 from eqs.metrics import Judge, Reading
 from eqs.pipelines.build import Dataset
 from eqs.pipelines.runs import Run
@@ -24,13 +25,8 @@ from eqs.study import (
     ReportFigure,
     accuracy_bars,
     correlations,
-    detection_panels,
-    event_rate,
-    events_panels,
-    rate_curves,
     report_figure,
     score_against_accuracy,
-    score_maps,
     sequence_dots,
     write_correlations,
     write_report,

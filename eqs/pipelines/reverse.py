@@ -13,7 +13,7 @@ from hydra.utils import instantiate
 from eqs.data import EventSource, RecordedEvents
 from eqs.pipelines.build import Dataset
 from eqs.pipelines.runs import Run
-from eqs.pipelines.train import build_task, test_values
+from eqs.pipelines.train import build_task
 
 
 def reverse_precision(
@@ -40,6 +40,5 @@ def reverse_precision(
         enable_checkpointing=False,
         enable_progress_bar=False,
     )
-    metrics = trainer.test(task, datamodule, ckpt_path=run.weights, verbose=False)
-    values = {name: value for stream in metrics for name, value in stream.items()}
-    return {name: test_values(values, name)["map"] for name in systems}
+    trainer.test(task, datamodule, ckpt_path=run.weights, verbose=False)
+    return {name: task.measured[name].map for name in systems}

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
 from eqs import __version__
-from eqs.files import read_json, short_hash, write_json
+from eqs.files import short_hash
+from eqs.pipelines.result import RunResult
 
 # What makes two detectors comparable: everything a training depends on but stream and seed ...
 RECIPE_KEYS = ("data", "protocol", "model", "recipe", "datamodule", "task")
 # ... and nothing that only says where files lie or how many processes read them.
 INCIDENTAL = {"data": {"root", "workers"}, "datamodule": {"seed", "num_workers", "histogram_cache"}}
-RESULT_KEYS = {"simulator", "system", "seed", "recipe", "own", "real", "protocol"}
 
 
 def recipe_hash(cfg: DictConfig) -> str:
@@ -69,24 +69,18 @@ class Run:
         """When it was finished, nanoseconds since 1970."""
         return (self.folder / "result.json").stat().st_mtime_ns
 
-    def result(self) -> dict[str, Any]:
+    @cached_property
+    def result(self) -> RunResult:
         """What the finished run measured.
 
         Raises:
             ValueError: the record lacks something, as those of older versions may.
         """
-        result = read_json(self.folder / "result.json")
-        missing = RESULT_KEYS - result.keys()
-        if missing:
-            raise ValueError(
-                f"Expected {', '.join(sorted(missing))} in {self.folder / 'result.json'}, got "
-                "none; delete the folder, which train.py makes anew, or set paths.runs"
-            )
-        return result
+        return RunResult.load(self.folder / "result.json")
 
-    def finish(self, result: dict[str, Any]) -> None:
+    def finish(self, result: RunResult) -> None:
         """Mark the run as finished."""
-        write_json(self.folder / "result.json", result)
+        result.save(self.folder / "result.json")
 
     def config(self) -> DictConfig:
         """The configuration the run was started with."""

@@ -11,13 +11,14 @@ from omegaconf import DictConfig
 from rich.console import Console
 from rich.table import Table
 
+from eqs.drawing import save_figure, score_curve, score_maps
 from eqs.events import EventReader
 from eqs.files import write_json
 from eqs.metrics import window_starts
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import score_anchors
-from eqs.study import save_figure, score_curve, score_maps, write_table
+from eqs.study import write_table
 
 
 @explained

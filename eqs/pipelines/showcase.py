@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.data import EventSource, LabelProtocol, Recording
+from eqs.drawing import Boxes
 from eqs.events import EventReader, Events
 from eqs.pipelines.detections import detections_over
 from eqs.pipelines.runs import Run
-from eqs.study import Boxes
 
 # Long enough for motion to show, short enough for a sharp picture.
 WINDOW_US = 50_000

@@ -6,7 +6,6 @@ import logging
 import shutil
 import time
 from pathlib import Path
-from typing import Any
 
 import lightning
 import torch
@@ -22,16 +21,17 @@ from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import write_judge
 from eqs.pipelines.prepare import prepare_data, prepare_stream
+from eqs.pipelines.result import RunResult
 from eqs.pipelines.runs import Run, recipe_hash
 from eqs.pipelines.timing import PhaseTimes, phase_times
 from eqs.processors import available_cores
-from eqs.tasks import DetectionTask
+from eqs.training import DetectionTask
 
 log = logging.getLogger(__name__)
 
 
 @explained
-def train(cfg: DictConfig) -> dict[str, Any]:
+def train(cfg: DictConfig) -> RunResult:
     """Train and test as configured; a finished run is reported, not repeated."""
     source = event_source(cfg.sim, cfg)
     runs = Path(cfg.paths.runs) / cfg.data.name
@@ -40,9 +40,8 @@ def train(cfg: DictConfig) -> dict[str, Any]:
         log.info("%s is finished already; overwrite=true trains it again", run.folder)
     else:
         execute(cfg, run, source, phase_times(cfg))
-    result = run.result()
-    show(result)
-    return result
+    show(run.result)
+    return run.result
 
 
 def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -> None:
@@ -70,13 +69,24 @@ def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -
         start = time.perf_counter()
         trainer.fit(task, datamodule, ckpt_path=checkpoint)
         trainer.save_checkpoint(run.weights, weights_only=True)
-        metrics = trainer.test(task, datamodule, verbose=False)
+        trainer.test(task, datamodule, verbose=False)
         seconds = time.perf_counter() - start
     if isinstance(source, RecordedEvents) and trainer.is_global_zero:
         with times.measure("judge"):
             write_judge(cfg, run, data, trainer.strategy.root_device)
-    values = {name: value for stream in metrics for name, value in stream.items()}
-    run.finish(describe(cfg, source, protocol.card(), values, seconds))
+    real, card = task.measured["real"], protocol.card()
+    run.finish(
+        RunResult(
+            simulator=source.name,
+            system=source.label,
+            seed=cfg.seed,
+            recipe=recipe_hash(cfg),
+            own=task.measured.get("own", real),  # a detector of real events has one test
+            real=real,
+            protocol={**card, "hash": short_hash(card)},
+            seconds=round(seconds, 1),
+        )
+    )
 
 
 def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]) -> DetectionTask:
@@ -124,46 +134,11 @@ def checkpoint_path(cfg: DictConfig, run: Run) -> Path | None:
     return path
 
 
-def describe(
-    cfg: DictConfig,
-    source: EventSource,
-    card: dict[str, Any],
-    values: dict[str, float],
-    seconds: float,
-) -> dict[str, Any]:
-    """The record of a finished run; where the stream is the real one, it is its own test."""
-    real = test_values(values, "real")
-    return {
-        "simulator": source.name,
-        "system": source.label,
-        "seed": cfg.seed,
-        "recipe": recipe_hash(cfg),
-        "own": test_values(values, "own") or real,
-        "real": real,
-        "protocol": {**card, "hash": short_hash(card)},
-        "seconds": round(seconds, 1),
-    }
-
-
-def test_values(values: dict[str, float], stream: str) -> dict[str, Any]:
-    """What was measured on one test stream, the values of classes nested by kind."""
-    nested: dict[str, Any] = {}
-    for name, value in values.items():
-        kind, _, label = name.removeprefix(f"test/{stream}/").partition("/")
-        if not name.startswith(f"test/{stream}/"):
-            continue
-        if label:
-            nested.setdefault(kind, {})[label] = value
-        else:
-            nested[kind] = value
-    return nested
-
-
-def show(result: dict[str, Any]) -> None:
+def show(result: RunResult) -> None:
     """Print both mAPs of a run."""
-    own, real = result["own"], result["real"]
+    own, real = result.own, result.real
     Console().print(
-        f"[bold]{result['system']}[/bold] seed {result['seed']}: "
-        f"own test mAP {100 * own['map']:.1f} (AP50 {100 * own['map_50']:.1f}), "
-        f"real test mAP {100 * real['map']:.1f} (AP50 {100 * real['map_50']:.1f})"
+        f"[bold]{result.system}[/bold] seed {result.seed}: "
+        f"own test mAP {100 * own.map:.1f} (AP50 {100 * own.map_50:.1f}), "
+        f"real test mAP {100 * real.map:.1f} (AP50 {100 * real.map_50:.1f})"
     )

@@ -1,20 +1,20 @@
 """The procedural driving world and the two cameras that make `dsec_mini`."""
 
 from eqs.scenes.camera import Exposure, FrameCamera
-from eqs.scenes.generate import DSECMini, Recording
+from eqs.scenes.generate import DSECMini, SequencePlan
 from eqs.scenes.labels import TRACK_DTYPE, LabelRule
 from eqs.scenes.sensor import ReferenceSensor, ReferenceStream
-from eqs.scenes.world import DrivingWorld, View
+from eqs.scenes.world import ActorsInView, DrivingWorld
 
 __all__ = [
     "TRACK_DTYPE",
+    "ActorsInView",
     "DSECMini",
     "DrivingWorld",
     "Exposure",
     "FrameCamera",
     "LabelRule",
-    "Recording",
     "ReferenceSensor",
     "ReferenceStream",
-    "View",
+    "SequencePlan",
 ]

@@ -31,7 +31,7 @@ RECORD: Final = "sequence.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recording:
+class SequencePlan:
     """One sequence to render: everything its files depend on.
 
     Args:
@@ -223,11 +223,11 @@ class DSECMini:
         """Hash of the reference sensor's parameters."""
         return self.sensor.definition_hash()
 
-    def recordings(self) -> list[Recording]:
+    def recordings(self) -> list[SequencePlan]:
         """All sequences, in the order of their names."""
         width, height = (int(number) for number in self.size.split("x"))
         return [
-            Recording(
+            SequencePlan(
                 split=split,
                 index=index,
                 height=height,
@@ -312,6 +312,6 @@ class DSECMini:
             return list(progress.track(records, total=total, description=f"dsec_mini {self.size}"))
 
 
-def _write(job: tuple[Recording, Path]) -> dict[str, Any]:
+def _write(job: tuple[SequencePlan, Path]) -> dict[str, Any]:
     recording, root = job
     return recording.write(root)

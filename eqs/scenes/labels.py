@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.scenes.world import View
+from eqs.scenes.world import ActorsInView
 
 # The published fields, then how much of the outline can be seen; readers go by name.
 TRACK_DTYPE: Final = np.dtype(
@@ -42,7 +42,7 @@ class LabelRule:
     least_visible: float = 0.5
     least_inside: float = 0.15
 
-    def boxes(self, view: View, t_us: int) -> NDArray[np.void]:
+    def boxes(self, view: ActorsInView, t_us: int) -> NDArray[np.void]:
         """Rows of `TRACK_DTYPE` for one instant, boxes clipped to the image."""
         height, width = view.owner.shape
         limits = np.array([width, height, width, height], np.float64)

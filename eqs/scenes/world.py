@@ -30,7 +30,7 @@ FIELD_OF_VIEW_RAD = np.deg2rad(44.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class ActorsInView:
     """What can be seen of the labelled actors at one instant; one row per actor in sight.
 
     Args:
@@ -133,14 +133,14 @@ class DrivingWorld:
         paint_actors(image, self._polygons, self._layers)
         return image
 
-    def view(self, t_us: float) -> View:
+    def view(self, t_us: float) -> ActorsInView:
         """Outlines and visibility of the labelled actors at `t_us`."""
         self._outline(t_us)
         owner = np.empty((self.height, self.width), np.int32)
         areas = measure_actors(self._polygons, owner, self._layers)
         labels = self._rows[:, -1].astype(np.int64)
         shown = np.flatnonzero((labels >= 0) & (areas[:, 1] > 0.0))
-        return View(
+        return ActorsInView(
             boxes=self._polygons.boxes[shown].copy(),
             labels=labels[shown],
             tracks=shown,

@@ -4,7 +4,7 @@
 bands, keys, order, readout. Whoever writes a simulator finds all of it here.
 """
 
-from eqs.simulators.base import Recorded, Simulator, require_not_negative, require_positive
+from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.dvs_voltmeter import DVSVoltmeter
 from eqs.simulators.esim import CARLA, ESIM, Vid2E
 from eqs.simulators.gazebo import Gazebo
@@ -43,7 +43,6 @@ __all__ = [
     "Pixels",
     "Prophesee",
     "Readout",
-    "Recorded",
     "RowReadout",
     "Simulator",
     "Stream",

@@ -105,18 +105,6 @@ class Simulator:
         return replace(events, span_us=stream.span_us)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Recorded:
-    """No simulator: the recorded events themselves, which stand in the study as `sim=real`."""
-
-    name: ClassVar[str] = "real"
-    version: ClassVar[int] = 1
-
-    def parameters(self) -> dict[str, Any]:
-        """Nothing to set."""
-        return {}
-
-
 def require_positive(simulator: Simulator, *names: str) -> None:
     """Refuse parameters that are not finite numbers above zero."""
     for name in names:

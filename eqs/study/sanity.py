@@ -12,8 +12,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from eqs.drawing.style import STYLE, figure
 from eqs.study.statistics import spearman
-from eqs.study.style import STYLE, figure
 
 NAMES = ("sequence", "corruption", "severity")
 

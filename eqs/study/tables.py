@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-REFERENCE = "real"
-"""The system without a simulator: a detector trained on the recorded events themselves."""
+from eqs.drawing.style import REFERENCE
 
 BASELINE = "baseline_"
 """How the columns of EQS's rivals begin."""

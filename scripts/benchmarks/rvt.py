@@ -18,13 +18,13 @@ from torch import Tensor
 from benchmarks import plain_rvt
 from benchmarks.simulators import PERIOD_US, draw_clip
 from benchmarks.timing import Cost, in_own_process, time_runs
-from eqs.data.histogram_cache import cached_histogram
 from eqs.events import EventReader, Events
 from eqs.models import RVTDetector
 from eqs.models.loss import detection_loss
 from eqs.models.yolox_head import decode_boxes
 from eqs.representations import stacked_histogram
 from eqs.simulators import ESIM
+from eqs.training.histogram_cache import cached_histogram
 
 CLASSES: Final = 3
 OBJECTS: Final = 8  # rows of labels per frame, half of them padding

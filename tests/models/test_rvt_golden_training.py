@@ -11,7 +11,7 @@ from torch.optim import AdamW
 from torch.optim.lr_scheduler import OneCycleLR
 
 from eqs.data import LabelProtocol
-from eqs.tasks import DetectionTask
+from eqs.training import DetectionTask
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "rvt" / "train.npz"
 LOSSES = ("loss", "iou_loss", "conf_loss", "cls_loss", "l1_loss", "num_fg")

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from eqs.data import RecordedEvents
 from eqs.pipelines.calibrate import Range, Search, check, run
-from eqs.simulators import V2E, Recorded
+from eqs.simulators import V2E
 from eqs.study import calibration_table
 
 CONTRAST = Range(parameters=("threshold_on_log", "threshold_off_log"), low=0.05, high=1.0)
@@ -55,7 +56,7 @@ def test_a_start_at_a_bound_is_left_the_other_way():
 def test_what_cannot_be_searched_is_named():
     check(V2E(), [CONTRAST, BANDWIDTH])
     with pytest.raises(ValueError, match=r"Expected a simulator to calibrate, got sim=real"):
-        check(Recorded(), [CONTRAST])
+        check(RecordedEvents(), [CONTRAST])
     missing = Range(parameters=("colour",), low=1.0, high=2.0)
     with pytest.raises(ValueError, match="v2e to have a colour between"):
         check(V2E(), [missing])

@@ -8,7 +8,6 @@ import pytest
 import torch
 from hydra import compose, initialize_config_dir
 
-from eqs.files import write_json
 from eqs.metrics import EventQualityScore, Judge
 from eqs.models import RVTDetector
 from eqs.pipelines import judge
@@ -16,7 +15,6 @@ from eqs.pipelines.build import dataset
 from eqs.pipelines.runs import Run, recipe_hash
 
 CONFIGS = Path(__file__).parents[2] / "eqs/configs"
-ACCURACY = {"own": {}, "real": {}, "protocol": {}}
 
 
 @pytest.fixture
@@ -25,13 +23,15 @@ def cfg(tmp_path):
         return compose("evaluate", [f"paths.runs={tmp_path}"])
 
 
-def finished(root, name, *, simulator="real", recipe="old", age_s=0):
-    folder = root / "dsec_mini" / simulator / name
-    folder.mkdir(parents=True)
-    result = {"simulator": simulator, "system": simulator, "seed": 0, "recipe": recipe, **ACCURACY}
-    write_json(folder / "result.json", result)
-    os.utime(folder / "result.json", (1e9 - age_s, 1e9 - age_s))
-    return Run(folder)
+@pytest.fixture
+def finished(result_of):
+    def make(root, name, *, simulator="real", recipe="old", age_s=0):
+        run = Run(root / "dsec_mini" / simulator / name)
+        run.finish(result_of(simulator, recipe=recipe))
+        os.utime(run.folder / "result.json", (1e9 - age_s, 1e9 - age_s))
+        return run
+
+    return make
 
 
 @pytest.fixture
@@ -41,20 +41,20 @@ def chosen(cfg, monkeypatch):
     return lambda: judge.find_judge(cfg, None)[0]
 
 
-def test_the_configured_recipe_wins_over_a_newer_one(cfg, chosen, tmp_path):
+def test_the_configured_recipe_wins_over_a_newer_one(cfg, chosen, finished, tmp_path):
     wanted = finished(tmp_path, "a", recipe=recipe_hash(cfg), age_s=100)
     finished(tmp_path, "b")
     assert chosen() == wanted
 
 
-def test_else_the_newest_wins(chosen, tmp_path):
+def test_else_the_newest_wins(chosen, finished, tmp_path):
     finished(tmp_path, "a", age_s=100)
     wanted = finished(tmp_path, "b")
     finished(tmp_path, "c", age_s=50)
     assert chosen() == wanted
 
 
-def test_detectors_of_simulated_streams_do_not_judge(chosen, tmp_path):
+def test_detectors_of_simulated_streams_do_not_judge(chosen, finished, tmp_path):
     finished(tmp_path, "a", simulator="esim")
     with pytest.raises(ValueError, match="Expected a judge trained on real events, got none"):
         chosen()

@@ -1,5 +1,6 @@
 """Run folders, their recipe and the sentence a mistake ends in."""
 
+import json
 import logging
 from pathlib import Path
 
@@ -65,10 +66,23 @@ def test_readers_help_a_gpu_and_leave_a_cpu_alone(monkeypatch: pytest.MonkeyPatc
         assert composed().datamodule.num_workers == readers
 
 
-def test_only_finished_runs_are_found(tmp_path: Path) -> None:
+def test_a_result_is_read_as_it_was_written_and_named_where_it_lacks_something(
+    tmp_path: Path, result_of
+) -> None:
+    run = Run(tmp_path / "esim-1" / "a-seed0")
+    run.finish(result_of("esim"))
+    assert run.result == result_of("esim")
+    record = json.loads((run.folder / "result.json").read_text())
+    for spoilt in ({"seed": 1}, {**record, "own": {"map": 0.1}}, {**record, "own": 3}):
+        (run.folder / "result.json").write_text(json.dumps(spoilt))
+        with pytest.raises(ValueError, match=r"Expected the record of a finished run in .*result"):
+            _ = Run(run.folder).result
+
+
+def test_only_finished_runs_are_found(tmp_path: Path, result_of) -> None:
     done, begun = Run(tmp_path / "esim-1" / "a-seed0"), Run(tmp_path / "esim-1" / "a-seed1")
     begun.save_config(OmegaConf.create({"seed": 1}))
-    done.finish({"simulator": "esim"})
+    done.finish(result_of("esim"))
     assert [run.folder for run in finished_runs(tmp_path)] == [done.folder]
     assert begun.config().seed == 1
     assert not begun.finished

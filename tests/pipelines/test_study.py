@@ -9,19 +9,25 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 from hydra import compose, initialize_config_dir
+from hydra.utils import instantiate
 from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig, open_dict
 from PIL import Image
+from torch.utils.data import DataLoader
 
 import eqs
 from eqs.data import RecordedEvents
 from eqs.metrics import Definition, Judge
-from eqs.pipelines import evaluate, register_resolvers, train
+from eqs.pipelines import detections_over, evaluate, register_resolvers, train
 from eqs.pipelines.build import dataset
 from eqs.pipelines.judge import KEPT_TAPS, find_scoring
+from eqs.pipelines.result import RunResult
 from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import Run, finished_runs
+from eqs.pipelines.train import build_task
+from eqs.training import Binning, EvaluationDataset, WindowSource
 
 CONFIGS = Path(eqs.__file__).parent / "configs"
 README = Path(__file__).parents[2] / "README.md"
@@ -63,6 +69,7 @@ def configured(place: Path, *overrides: str, name: str = "train") -> DictConfig:
         "+data.generator.workers=1",
         "recipe.steps_per_epoch=2",
         "recipe.validate_every_epochs=1",
+        "task.confidence_threshold=1e-5",  # what has hardly learnt anything is not sure of it
     ]
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose(name, overrides=[*small, *paths, *overrides])
@@ -76,22 +83,22 @@ def runs_of(place: Path) -> list[Run]:
 
 
 @pytest.fixture(scope="module")
-def trained(place: Path) -> dict[str, dict]:
+def trained(place: Path) -> dict[str, RunResult]:
     return {name: train(configured(place, f"sim={name}")) for name in ("real", "esim")}
 
 
 @pytest.mark.slow
-def test_a_run_reports_both_test_streams(trained: dict[str, dict]) -> None:
+def test_a_run_reports_both_test_streams(trained: dict[str, RunResult]) -> None:
     esim, real = trained["esim"], trained["real"]
-    assert set(esim["own"]["map_per_class"]) == {"pedestrian", "two_wheeler", "car"}
-    assert esim["own"]["ground_truths_per_class"] == real["real"]["ground_truths_per_class"]
-    assert real["own"] == real["real"]
-    assert esim["recipe"] == real["recipe"]
-    assert esim["system"] != "esim"
+    assert set(esim.own.map_per_class) == {"pedestrian", "two_wheeler", "car"}
+    assert esim.own.ground_truths_per_class == real.real.ground_truths_per_class
+    assert real.own == real.real
+    assert esim.recipe == real.recipe
+    assert esim.system != "esim"
 
 
 @pytest.mark.slow
-def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, dict]) -> None:
+def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, RunResult]) -> None:
     def stamps() -> list[int]:
         runs = finished_runs(place / "runs/dsec_mini_smoke")
         return [run.weights.stat().st_mtime_ns for run in runs]
@@ -106,26 +113,25 @@ def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, dict]) -
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [PowerCut, PowerCutBetween])
 def test_an_interrupted_run_ends_with_the_same_numbers(
-    place: Path, trained: dict[str, dict], kind: type[Callback]
+    place: Path, trained: dict[str, RunResult], kind: type[Callback]
 ) -> None:
     elsewhere = [f"paths.runs={place / kind.__name__}", "sim=esim", "ckpt_path=last"]
     elsewhere += ["recipe.validate_every_epochs=2"]  # when it validates may change nothing
     cut, again = (configured(place, *elsewhere) for _ in range(2))
     with open_dict(cut), open_dict(again):
         cut.callbacks = {"cut": {"_target_": f"{__name__}.{kind.__name__}"}}
-        again.callbacks = {"lines": {"_target_": "eqs.tasks.EpochLines", "label": "esim"}}
+        again.callbacks = {"lines": {"_target_": "eqs.training.EpochLines", "label": "esim"}}
     with pytest.raises(Interrupted):
         train(cut)
     assert not list(finished_runs(place / kind.__name__ / "dsec_mini_smoke"))
     assert len(list((place / kind.__name__).rglob("last.ckpt"))) == 1
     result = train(again)
-    for stream in ("own", "real"):
-        assert result[stream] == trained["esim"][stream]
+    assert (result.own, result.real) == (trained["esim"].own, trained["esim"].real)
 
 
 @pytest.mark.slow
 def test_a_refused_overwrite_keeps_the_old_run(
-    place: Path, trained: dict[str, dict], caplog: pytest.LogCaptureFixture
+    place: Path, trained: dict[str, RunResult], caplog: pytest.LogCaptureFixture
 ) -> None:
     with pytest.raises(SystemExit):
         train(configured(place, "sim=esim", "overwrite=true", "ckpt_path=nowhere.ckpt"))
@@ -137,7 +143,7 @@ def test_a_refused_overwrite_keeps_the_old_run(
 
 @pytest.mark.slow
 def test_detections_are_filmed(
-    place: Path, trained: dict[str, dict], monkeypatch: pytest.MonkeyPatch
+    place: Path, trained: dict[str, RunResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = next(finished_runs(place / "runs/dsec_mini_smoke")).folder
     recording = next((place / "datasets").glob("*/test/*"))
@@ -154,19 +160,47 @@ def test_detections_are_filmed(
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.*LeafSpec.*:FutureWarning", "ignore:.*many workers")
-def test_the_reverse_mAP_of_real_events_is_the_forward_one(
-    place: Path, trained: dict[str, dict]
+@pytest.mark.parametrize("protocol", ["coco", "prophesee_gen1"])
+def test_films_show_the_detections_that_enter_the_mAP(
+    place: Path, trained: dict[str, RunResult], protocol: str
 ) -> None:
-    runs = {run.result()["simulator"]: run for run in finished_runs(place / "runs/dsec_mini_smoke")}
-    data = dataset(configured(place, name="evaluate"))
-    found = reverse_precision(runs["real"], data, {"again": RecordedEvents()})
-    assert found == {"again": trained["real"]["real"]["map"]}
+    (run,) = (run for run in runs_of(place) if run.result.simulator == "real")
+    cfg = configured(place, f"protocol={protocol}", "model.num_classes=3")
+    rule = instantiate(cfg.protocol)
+    recording = dataset(cfg).recordings("test")[0]
+    filmed = list(detections_over(run, recording, recording.events_path, rule))
+    task = build_task(cfg, rule, ["real"]).eval()
+    weights = torch.load(run.weights, weights_only=True)["state_dict"]
+    task.load_state_dict({k: v for k, v in weights.items() if k.startswith("model.")}, strict=False)
+    source = WindowSource(
+        recording=recording, events_path=recording.events_path, protocol=rule, binning=Binning()
+    )
+    counted = []
+    with torch.no_grad():
+        for chunk in DataLoader(EvaluationDataset([source], chunk_length=4), batch_size=None):
+            everywhere = torch.ones_like(chunk["labelled"])
+            counted += task.detect({**chunk, "labelled": everywhere})
+    assert len(filmed) == len(counted) == len(recording.frame_times_us) - 1
+    assert sum(len(boxes.labels) for boxes in filmed) > 0
+    for boxes, found in zip(filmed, counted, strict=True):
+        np.testing.assert_allclose(boxes.scores, found["scores"], atol=1e-5)
+        np.testing.assert_allclose(boxes.corners, found["boxes"], atol=1e-2)
 
 
 @pytest.mark.slow
-def test_training_on_real_events_leaves_a_judge(place: Path, trained: dict[str, dict]) -> None:
-    folders = {run.result()["simulator"]: run.folder for run in runs_of(place)}
+@pytest.mark.filterwarnings("ignore:.*LeafSpec.*:FutureWarning", "ignore:.*many workers")
+def test_the_reverse_mAP_of_real_events_is_the_forward_one(
+    place: Path, trained: dict[str, RunResult]
+) -> None:
+    runs = {run.result.simulator: run for run in finished_runs(place / "runs/dsec_mini_smoke")}
+    data = dataset(configured(place, name="evaluate"))
+    found = reverse_precision(runs["real"], data, {"again": RecordedEvents()})
+    assert found == {"again": trained["real"].real.map}
+
+
+@pytest.mark.slow
+def test_training_on_real_events_leaves_a_judge(place: Path, trained: dict[str, RunResult]) -> None:
+    folders = {run.result.simulator: run.folder for run in runs_of(place)}
     assert not (folders["esim"] / "judge.json").exists()
     judge = Judge.load(folders["real"])
     assert judge.definition == Definition(features="centred", architecture="rvt-tiny-split1")
@@ -181,7 +215,7 @@ def test_training_on_real_events_leaves_a_judge(place: Path, trained: dict[str, 
 @pytest.mark.parametrize("reading", ["eqs", "eqs_paper"])
 def test_the_readme_s_snippet_gives_the_study_s_row(
     place: Path,
-    trained: dict[str, dict],
+    trained: dict[str, RunResult],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -190,7 +224,7 @@ def test_the_readme_s_snippet_gives_the_study_s_row(
     cfg = configured(place, "score=true", f"metric={reading}", name="evaluate")
     evaluate(cfg)
     rows = pd.read_csv(place / "results/dsec_mini_smoke/eqs.csv").query("system == 'esim'")
-    (run,) = (run for run in runs_of(place) if run.result()["simulator"] == "real")
+    (run,) = (run for run in runs_of(place) if run.result.simulator == "real")
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
     (snippet,) = (block for block in blocks if "EventQualityScore" in block)
     if reading == "eqs_paper":
@@ -209,7 +243,7 @@ def test_the_readme_s_snippet_gives_the_study_s_row(
 
 
 @pytest.mark.slow
-def test_the_study_is_written_down(place: Path, trained: dict[str, dict]) -> None:
+def test_the_study_is_written_down(place: Path, trained: dict[str, RunResult]) -> None:
     evaluate(configured(place, "score=true", "eqs.warmup_windows=1", name="evaluate"))
     results = place / "results/dsec_mini_smoke"
     study, scores = pd.read_csv(results / "study.csv"), pd.read_csv(results / "eqs.csv")

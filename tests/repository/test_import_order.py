@@ -10,13 +10,13 @@ import eqs
 ROOT = Path(eqs.__file__).parent
 ORDER = [
     {"events"},
-    {"frames", "representations"},
+    {"frames", "representations", "drawing"},
     {"simulators"},
     {"scenes"},
     {"data"},
     {"models"},
     {"metrics"},
-    {"tasks"},
+    {"training"},
     {"study"},
     {"pipelines"},
 ]
@@ -52,5 +52,5 @@ def test_imports_run_downwards(path: Path) -> None:
 
 
 def test_an_upward_import_would_be_found() -> None:
-    source = "from eqs.tasks import x\nimport eqs.models.rvt"
-    assert imported_packages(source) == {"tasks", "models"}
+    source = "from eqs.training import x\nimport eqs.models.rvt"
+    assert imported_packages(source) == {"training", "models"}

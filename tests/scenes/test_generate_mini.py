@@ -8,7 +8,7 @@ from omegaconf import OmegaConf
 from PIL import Image
 
 from eqs.events import EventReader
-from eqs.scenes import DSECMini, Recording
+from eqs.scenes import DSECMini, SequencePlan
 
 CONFIG = Path(__file__).parents[2] / "eqs/configs/data/dsec_mini.yaml"
 TINY = DSECMini(size="32x24", sequences={"train": 2, "test": 1}, frames=4, workers=1)
@@ -102,7 +102,7 @@ def test_two_workers_make_the_same_files(root, tmp_path):
 
 
 def test_generation_resumes_after_an_interruption(root, tmp_path, monkeypatch):
-    write = Recording.write
+    write = SequencePlan.write
     done = []
 
     def interrupted(self, folder):
@@ -112,16 +112,16 @@ def test_generation_resumes_after_an_interruption(root, tmp_path, monkeypatch):
         done.append(self.name)
         return write(self, folder)
 
-    monkeypatch.setattr(Recording, "write", interrupted)
+    monkeypatch.setattr(SequencePlan, "write", interrupted)
     with pytest.raises(KeyboardInterrupt):
         TINY.generate(tmp_path)
     assert not (tmp_path / "manifest.json").exists()
-    monkeypatch.setattr(Recording, "write", write)
+    monkeypatch.setattr(SequencePlan, "write", write)
 
     rendered = []
-    render = Recording._render
+    render = SequencePlan._render
     monkeypatch.setattr(
-        Recording,
+        SequencePlan,
         "_render",
         lambda self, folder: (rendered.append(self.name), render(self, folder))[1],
     )
@@ -135,7 +135,7 @@ def test_nothing_is_rendered_twice(root, monkeypatch):
     def fail(self, folder):
         raise AssertionError("rendered again")
 
-    monkeypatch.setattr(Recording, "_render", fail)
+    monkeypatch.setattr(SequencePlan, "_render", fail)
     assert TINY.generate(root) == root
 
 

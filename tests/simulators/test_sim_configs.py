@@ -9,6 +9,7 @@ import yaml
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
+from eqs.data import RecordedEvents
 from eqs.simulators import (
     CARLA,
     ESIM,
@@ -20,7 +21,6 @@ from eqs.simulators import (
     Gazebo,
     ImprovedESIM,
     Prophesee,
-    Recorded,
     RowReadout,
     SynchronousReadout,
     Vid2E,
@@ -37,7 +37,6 @@ SIMULATORS = {
     "dvs_voltmeter": DVSVoltmeter,
     "icns": ICNS,
     "improved_esim": ImprovedESIM,
-    "real": Recorded,
     "vid2e": Vid2E,
 }
 READOUTS = {"bottleneck": Bottleneck, "row": RowReadout, "synchronous": SynchronousReadout}
@@ -66,6 +65,12 @@ def composed(tmp_path, *overrides):
     )
     with initialize_config_dir(str(tmp_path), version_base=None):
         return compose("main", overrides=list(overrides))
+
+
+def test_the_recorded_events_have_nothing_to_set():
+    values = yaml.safe_load((CONFIGS / "sim" / "real.yaml").read_text())
+    assert values == {"_target_": "eqs.data.RecordedEvents"}
+    assert instantiate(values) == RecordedEvents()
 
 
 @pytest.mark.parametrize("name", SIMULATORS)
@@ -126,7 +131,7 @@ def test_a_readout_holds_for_every_simulator_of_an_evaluation():
 
 
 def test_every_simulator_has_a_parameter_file():
-    assert {path.stem for path in (CONFIGS / "sim").glob("*.yaml")} == set(SIMULATORS)
+    assert {path.stem for path in (CONFIGS / "sim").glob("*.yaml")} == {*SIMULATORS, "real"}
 
 
 @pytest.mark.parametrize("pair", PRESETS)
@@ -162,4 +167,4 @@ def test_the_command_line_overrides_a_preset(tmp_path):
 def test_the_experiment_of_all_simulators_leaves_none_out():
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose("evaluate", ["experiment=all_simulators"])
-    assert set(cfg.simulators) == set(SIMULATORS) - {"real"}
+    assert set(cfg.simulators) == set(SIMULATORS)

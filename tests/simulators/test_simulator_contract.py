@@ -23,7 +23,6 @@ from eqs.simulators import (
     Gazebo,
     ImprovedESIM,
     Prophesee,
-    Recorded,
     RowReadout,
     Vid2E,
 )
@@ -221,13 +220,9 @@ def test_another_seed_gives_other_events(simulator, walk):
     assert len(first) != len(second) or not np.array_equal(first.t, second.t)
 
 
-@pytest.mark.parametrize("simulator", [*SIMULATORS, Recorded()], ids=lambda s: s.name)
+@pytest.mark.parametrize("simulator", SIMULATORS, ids=lambda s: s.name)
 def test_parameters_survive_json(simulator):
     assert json.loads(json.dumps(simulator.parameters())) == simulator.parameters()
-
-
-def test_recorded_events_have_no_parameters():
-    assert (Recorded().name, Recorded().parameters()) == ("real", {})
 
 
 def test_importing_simulators_does_not_import_torch():

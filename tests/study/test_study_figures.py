@@ -3,24 +3,26 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 
-from eqs.events import Events
-from eqs.study import (
-    FIGURE_TEXTS,
+from eqs.drawing import (
     Boxes,
-    accuracy_bars,
-    correlations,
     detection_panels,
     event_image,
     event_rate,
     events_panels,
     rate_curves,
-    report_figure,
     save_figure,
-    score_against_accuracy,
     score_maps,
+)
+from eqs.drawing.style import BRIGHTER, DARKER, colours
+from eqs.events import Events
+from eqs.study import (
+    FIGURE_TEXTS,
+    accuracy_bars,
+    correlations,
+    report_figure,
+    score_against_accuracy,
     sequence_dots,
 )
-from eqs.study.style import BRIGHTER, DARKER, colours
 
 
 def stream(n, height=6, width=8, seed=0):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import torch
 
-from eqs.tasks import EpochLines
+from eqs.training import EpochLines
 
 TRAINER = SimpleNamespace(
     current_epoch=0, max_epochs=2, callback_metrics={"loss": torch.tensor(1.5)}

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from eqs.drawing import Boxes, event_pictures, with_boxes, write_film
 from eqs.events import EventReader, Events
-from eqs.study import Boxes, event_pictures, with_boxes, write_film
 
 
 @pytest.fixture

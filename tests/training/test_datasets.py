@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 import torch
 
-from eqs.data import (
+from eqs.data import LabelProtocol, Recording
+from eqs.events import Events
+from eqs.representations import stacked_histogram
+from eqs.training import (
     Augmentation,
     Binning,
     EvaluationDataset,
-    LabelProtocol,
-    Recording,
     TrainingDataset,
     WindowSource,
 )
-from eqs.events import Events
-from eqs.representations import stacked_histogram
 
 PROTOCOL = LabelProtocol(name="test", classes={"pedestrian": [0], "car": [2]})
 

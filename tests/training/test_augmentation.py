@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eqs.data import Augmentation, View
+from eqs.training import Augmentation, View
 
 HEIGHT, WIDTH = 48, 64
 GOLDEN = Path(__file__).parents[1] / "golden" / "rvt" / "zoom.npz"

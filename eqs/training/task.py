@@ -13,18 +13,17 @@ from torch.optim import Optimizer
 from torch.optim.lr_scheduler import LRScheduler
 
 from eqs.data import LabelProtocol
-from eqs.metrics import MeanAveragePrecision
+from eqs.metrics import Accuracy, MeanAveragePrecision
 from eqs.models import (
     Detections,
     RVTDetector,
     States,
     detach_states,
     gather_frames,
-    postprocess,
     reset_states,
 )
-
-Batch = dict[str, Tensor]
+from eqs.training.datasets import Batch
+from eqs.training.selection import Selection
 
 
 class DetectionTask(lightning.LightningModule):
@@ -58,13 +57,15 @@ class DetectionTask(lightning.LightningModule):
         self.model = model
         self.make_optimizer = optimizer
         self.make_scheduler = scheduler
-        self.thresholds = (confidence_threshold, nms_threshold)
+        self.selection = Selection(protocol, confidence_threshold, nms_threshold)
         self.protocol = protocol
         self.test_streams = list(test_streams)
         classes = len(protocol.class_names)
         self.val_precision = MeanAveragePrecision(num_classes=classes)
         self.test_precision = [MeanAveragePrecision(num_classes=classes) for _ in test_streams]
         self.test_metrics = nn.ModuleList(self.test_precision)  # so that they move with the task
+        self.measured: dict[str, Accuracy] = {}
+        """What the last validation or test found, by the name of the stream, `val` among them."""
         self._train_states: States | None = None
         self._evaluation_states: States | None = None
 
@@ -85,7 +86,7 @@ class DetectionTask(lightning.LightningModule):
 
     def on_validation_epoch_end(self) -> None:
         """Log the mAP of the whole validation set."""
-        self._log_precision("val", self.val_precision)
+        self._finish("val", "val", self.val_precision)
 
     def test_step(self, batch: Batch, batch_idx: int, dataloader_idx: int = 0) -> None:
         """Collect detections on one of the test streams."""
@@ -94,7 +95,7 @@ class DetectionTask(lightning.LightningModule):
     def on_test_epoch_end(self) -> None:
         """Log the mAP of each test stream."""
         for stream, metric in zip(self.test_streams, self.test_precision, strict=True):
-            self._log_precision(f"test/{stream}", metric)
+            self._finish(stream, f"test/{stream}", metric)
 
     def detect(self, batch: Batch) -> list[Detections]:
         """Detections of each labelled frame of a chunk, with states carried from the last call.
@@ -109,14 +110,8 @@ class DetectionTask(lightning.LightningModule):
         labelled = batch["labelled"]
         if not labelled.any():
             return []
-        predictions = self.model.detect(gather_frames(maps, labelled)).float()
-        protocol, (confidence, overlap) = self.protocol, self.thresholds
-        found = postprocess(predictions, confidence, overlap, class_score=protocol.class_score)
-        if protocol.filter_detections:
-            found = [
-                large_detections(each, protocol, batch["histograms"].shape[-1]) for each in found
-            ]
-        return found
+        predictions = self.model.detect(gather_frames(maps, labelled))
+        return self.selection(predictions, batch["histograms"].shape[-1])
 
     def _evaluate(self, batch: Batch, metric: MeanAveragePrecision) -> None:
         detections = self.detect(batch)
@@ -124,17 +119,12 @@ class DetectionTask(lightning.LightningModule):
         if detections:
             metric.update(detections, targets)
 
-    def _log_precision(self, prefix: str, metric: MeanAveragePrecision) -> None:
-        values = metric.compute()
+    def _finish(self, stream: str, prefix: str, metric: MeanAveragePrecision) -> None:
+        accuracy = Accuracy.of(metric.compute(), self.protocol.class_names)
         metric.reset()
         self._evaluation_states = None
-        scalars = {
-            key: value for key, value in values.items() if key.startswith("map") and not value.ndim
-        }
-        for key in ("map_per_class", "map_50_per_class", "ground_truths_per_class"):
-            pairs = zip(self.protocol.class_names, values[key], strict=True)
-            scalars |= {f"{key}/{name}": value.float() for name, value in pairs}
-        self.log_dict({f"{prefix}/{key}": value for key, value in scalars.items()})
+        self.measured[stream] = accuracy
+        self.log_dict({f"{prefix}/{name}": value for name, value in accuracy.scalars().items()})
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
         """Optimizer with a schedule that moves once per batch.
@@ -170,13 +160,6 @@ def ground_truth(rows: Tensor) -> dict[str, Tensor]:
     rows = rows[rows[:, 3] > 0].float()
     centre, half = rows[:, 1:3], rows[:, 3:5] / 2
     return {"boxes": torch.cat([centre - half, centre + half], dim=1), "labels": rows[:, 0].long()}
-
-
-def large_detections(found: Detections, protocol: LabelProtocol, width: int) -> Detections:
-    """The detections of one frame that reach the protocol's size limits."""
-    large = protocol.large_enough(found["boxes"].cpu().numpy(), width)
-    kept = torch.from_numpy(large).to(found["boxes"].device)
-    return {name: values[kept] for name, values in found.items()}
 
 
 def move_states(states: States, device: torch.device) -> States:

@@ -11,8 +11,7 @@ from torch.optim.lr_scheduler import ConstantLR
 
 from eqs.data import LabelProtocol
 from eqs.models import RVTDetector
-from eqs.pipelines import DetectionPictures
-from eqs.tasks import DetectionTask
+from eqs.training import DetectionPictures, DetectionTask
 
 
 def chunks(recordings=2, windows=3, height=32, width=64):

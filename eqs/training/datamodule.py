@@ -9,8 +9,10 @@ from typing import Protocol
 import lightning
 from torch.utils.data import DataLoader, Sampler
 
-from eqs.data.augment import Augmentation
-from eqs.data.datasets import (
+from eqs.data.labels import LabelProtocol
+from eqs.data.recording import Recording
+from eqs.training.augmentation import Augmentation
+from eqs.training.datasets import (
     Batch,
     Binning,
     EvaluationDataset,
@@ -18,8 +20,6 @@ from eqs.data.datasets import (
     WindowSource,
     check_boxes,
 )
-from eqs.data.labels import LabelProtocol
-from eqs.data.recording import Recording
 
 
 class Splits(Protocol):

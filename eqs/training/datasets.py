@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from eqs.data.augment import Augmentation, View, visible
-from eqs.data.histogram_cache import cached_histogram
 from eqs.data.labels import LabelProtocol, detector_rows
 from eqs.data.recording import Recording
-from eqs.data.sampling import Chunk, Schedule, keyed_generator
 from eqs.data.windows import detection_windows
 from eqs.events import EventReader
 from eqs.files import short_hash
 from eqs.representations import HISTOGRAM_VERSION, stacked_histogram
+from eqs.training.augmentation import Augmentation, View, visible
+from eqs.training.histogram_cache import cached_histogram
+from eqs.training.sampling import Chunk, Schedule, keyed_generator
 
 Batch = dict[str, Tensor]
 LabelledBoxes = tuple[NDArray[np.float32], NDArray[np.int64]]

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eqs.data import Schedule, keyed_generator
+from eqs.training import Schedule, keyed_generator
 
 
 def schedule(**options):

@@ -11,15 +11,9 @@ import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 from torch import nn
 
-from eqs.data import (
-    Augmentation,
-    DSECFolder,
-    EventDataModule,
-    LabelProtocol,
-    RecordedEvents,
-    StepSampler,
-)
+from eqs.data import DSECFolder, LabelProtocol, RecordedEvents
 from eqs.events import EventReader
+from eqs.training import Augmentation, EventDataModule, StepSampler
 
 PROTOCOL = LabelProtocol(name="test", classes={"car": [2]})
 

@@ -12,10 +12,10 @@ import torch
 from lightning.pytorch.callbacks import Callback
 from lightning.pytorch.loggers import TensorBoardLogger
 
-from eqs.data.datasets import Batch
-from eqs.pipelines.detections import boxes_of
-from eqs.study import histogram_picture, with_boxes
-from eqs.tasks import DetectionTask
+from eqs.drawing import histogram_picture, with_boxes
+from eqs.training.datasets import Batch
+from eqs.training.selection import boxes_of
+from eqs.training.task import DetectionTask
 
 CHOICE = 60  # frames to choose from; a whole recording may not fit into memory
 

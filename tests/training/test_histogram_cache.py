@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from eqs.data.histogram_cache import cached_histogram
+from eqs.training.histogram_cache import cached_histogram
 
 SHAPE = (20, 24, 32)
 

@@ -10,8 +10,8 @@ from torch.optim.lr_scheduler import ConstantLR
 
 from eqs.data import LabelProtocol
 from eqs.models import RVTDetector
-from eqs.tasks import DetectionTask
-from eqs.tasks.detection import ground_truth
+from eqs.training import DetectionTask, Selection
+from eqs.training.task import ground_truth
 
 WINDOWS, SAMPLES, HEIGHT, WIDTH = 3, 2, 32, 32
 
@@ -114,11 +114,13 @@ def test_ground_truth_turns_rows_into_corners_and_drops_padding() -> None:
 
 def test_detections_below_the_size_limits_drop_out_when_asked(task: DetectionTask) -> None:
     task.eval()
-    task.thresholds = (0.0, 1.0)
+    protocol = task.protocol
+    task.selection = Selection(protocol, confidence_threshold=0.0, nms_threshold=1.0)
     with torch.no_grad():
         everything = task.detect(batch())[0]
         task._evaluation_states = None
-        task.protocol = replace(task.protocol, min_side_px=9.0, filter_detections=True)
+        asked = replace(protocol, min_side_px=9.0, filter_detections=True)
+        task.selection = replace(task.selection, protocol=asked)
         large = task.detect(batch())[0]
     sides = everything["boxes"][:, 2:] - everything["boxes"][:, :2]
     keep = (sides >= 9.0).all(1)

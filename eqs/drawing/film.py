@@ -10,9 +10,9 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from eqs.drawing.pictures import Boxes, above, box_colour, event_image
+from eqs.drawing.style import BRIGHTER, DARKER
 from eqs.events import EventReader, Events
-from eqs.study.pictures import Boxes, above, box_colour, event_image
-from eqs.study.style import BRIGHTER, DARKER
 
 Picture = NDArray[np.uint8]
 STILLS = 8  # in a strip

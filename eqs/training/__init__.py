@@ -1,0 +1,38 @@
+"""Training a detector: windows, batches, augmentation, and what one step does."""
+
+from eqs.training.augmentation import Augmentation, View
+from eqs.training.datamodule import EventDataModule, StepSampler
+from eqs.training.datasets import (
+    Batch,
+    Binning,
+    EvaluationDataset,
+    TrainingDataset,
+    WindowSource,
+)
+from eqs.training.layers import SynchronisedNorms
+from eqs.training.pictures import DetectionPictures
+from eqs.training.progress import EpochLines
+from eqs.training.sampling import Chunk, Schedule, keyed_generator
+from eqs.training.selection import Selection, boxes_of
+from eqs.training.task import DetectionTask
+
+__all__ = [
+    "Augmentation",
+    "Batch",
+    "Binning",
+    "Chunk",
+    "DetectionPictures",
+    "DetectionTask",
+    "EpochLines",
+    "EvaluationDataset",
+    "EventDataModule",
+    "Schedule",
+    "Selection",
+    "StepSampler",
+    "SynchronisedNorms",
+    "TrainingDataset",
+    "View",
+    "WindowSource",
+    "boxes_of",
+    "keyed_generator",
+]
