@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import functools
 import logging
 import os
-import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
 from hydra.errors import InstantiationException
 from omegaconf import DictConfig
-from omegaconf.errors import (
-    ConfigAttributeError,
-    ConfigKeyError,
-    MissingMandatoryValue,
-    OmegaConfBaseException,
-)
+from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
+
+from eqs.pipelines.keys import in_this_command
 
 log = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -47,27 +41,6 @@ def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig],
     return run
 
 
-@contextmanager
-def keys_explained() -> Iterator[None]:
-    """Add to Hydra's complaint about a key that does not exist those that may have been meant."""
-    try:
-        yield
-    except SystemExit as stop:
-        cause = getattr(stop.__context__, "__cause__", None)
-        if isinstance(cause, ConfigAttributeError | ConfigKeyError):
-            sys.stderr.write(existing_keys(cause) + "\n")
-        raise
-
-
-def existing_keys(error: ConfigAttributeError | ConfigKeyError) -> str:
-    """What could have been written in place of a key that does not exist."""
-    place, _, key = str(error.full_key).rpartition(".")
-    names = [str(name) for name in error.parent_node or () if not str(name).startswith("_")]
-    near = difflib.get_close_matches(key, names, n=3) or sorted(names)
-    keys = ", ".join(f"{place}.{name}" if place else name for name in near)
-    return f"Expected a key that exists, got {error.full_key}; set {keys}"
-
-
 def check_seed(cfg: DictConfig) -> None:
     """Refuse what is no seed to every generator that gets it.
 
@@ -80,12 +53,12 @@ def check_seed(cfg: DictConfig) -> None:
         )
 
 
-def sentence(error: BaseException, cfg: DictConfig) -> str:
+def sentence(error: BaseException, cfg: DictConfig, where: str = "") -> str:
     """The message of the mistake itself, below what wraps it, with a key to change."""
     if isinstance(error, InstantiationException) and error.__cause__ is not None:
-        where = str(error).rsplit("full_key: ", maxsplit=1)
-        key = f" (config key {where[1].strip()})" if len(where) > 1 else ""
-        return sentence(error.__cause__, cfg) + key
+        place = str(error).rpartition("full_key: ")[2].strip() if "full_key: " in str(error) else ""
+        message = sentence(error.__cause__, cfg, place)
+        return f"{message} (config key {place})" if place else message
     if isinstance(error, TypeError | AttributeError):  # of a constructor: a text for a number
         return f"Expected values of the configured kinds, got another: {error}; set them anew"
     if isinstance(error, MissingMandatoryValue):
@@ -98,7 +71,7 @@ def sentence(error: BaseException, cfg: DictConfig) -> str:
             f"Expected to read and write {error.filename or 'files'}, got: {reason}; "
             f"set {path_keys(error.filename, cfg)}"
         )
-    return str(error) or type(error).__name__
+    return in_this_command(str(error), cfg, where) or type(error).__name__
 
 
 def path_keys(filename: object, cfg: DictConfig) -> str:

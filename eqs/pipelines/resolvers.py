@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import torch
 from omegaconf import OmegaConf
 
 from eqs.processors import available_cores
@@ -16,6 +15,8 @@ def precision(device: str) -> str:
 
     bfloat16 autocast pays on processors that multiply in it and costs time on the others.
     """
+    import torch  # only where the value is asked for, so that a mistyped command ends at once
+
     if device == "gpu" or (device == "auto" and torch.cuda.is_available()):
         return (
             "bf16-mixed"
@@ -31,6 +32,8 @@ def workers() -> int:
     A GPU must not wait for one process that decompresses and bins; without one, readers would take
     the cores from the training.
     """
+    import torch
+
     return min(MOST_WORKERS, available_cores()) if torch.cuda.is_available() else 0
 
 

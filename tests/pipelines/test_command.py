@@ -11,8 +11,9 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 import eqs
-from eqs.pipelines import register_resolvers
-from eqs.pipelines.command import explained, keys_explained
+from eqs.pipelines.command import explained
+from eqs.pipelines.keys import in_this_command, keys_explained
+from eqs.pipelines.resolvers import register_resolvers
 
 CONFIGS = Path(eqs.__file__).parent / "configs"
 
@@ -96,6 +97,8 @@ def test_a_mistake_of_ours_keeps_its_traceback() -> None:
     [
         ("sim.treshold_on_log=0.3", "got sim.treshold_on_log; set sim.threshold_on_log, "),
         ("sead=1", "got sead; set seed\n"),
+        ("epochs=3", "got epochs; set recipe.epochs\n"),
+        ("threshold_on_log=1", "set sim.threshold_on_log\n"),
         ("datamodule.zzz=1", "got datamodule.zzz; set datamodule."),
     ],
 )
@@ -114,3 +117,19 @@ def test_a_key_that_does_not_exist_names_those_that_do(
     assert message.startswith("Expected a key that exists, ")
     assert wanted in message
     assert "_target_" not in message
+
+
+@pytest.mark.parametrize(
+    ("advice", "where", "expected"),
+    [
+        ("set sim.mode", "simulators.v2e", "set simulators.v2e.mode"),
+        ("set sim.knee_level", "", "set simulators.v2e.knee_level"),
+        ("set sim.nothing or data.root", "", "set sim.nothing or data.root"),
+        ("set recipe.epochs", "", "set recipe.epochs"),
+    ],
+)
+def test_advice_names_keys_that_the_command_has(advice: str, where: str, expected: str) -> None:
+    register_resolvers()
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("evaluate")
+    assert in_this_command(f"Expected a, got b; {advice}", cfg, where).endswith(expected)

@@ -10,9 +10,9 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 import eqs
-from eqs.pipelines import register_resolvers
 from eqs.pipelines.command import explained
 from eqs.pipelines.evaluate import short_names
+from eqs.pipelines.resolvers import register_resolvers
 from eqs.pipelines.runs import Run, finished_runs, recipe_hash
 from eqs.pipelines.timing import PhaseTimes
 

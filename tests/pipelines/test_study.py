@@ -20,13 +20,15 @@ from torch.utils.data import DataLoader
 import eqs
 from eqs.data import RecordedEvents
 from eqs.metrics import Definition, Judge
-from eqs.pipelines import detections_over, evaluate, register_resolvers, train
 from eqs.pipelines.build import dataset
+from eqs.pipelines.detections import detections_over
+from eqs.pipelines.evaluate import evaluate
 from eqs.pipelines.judge import KEPT_TAPS, find_scoring
+from eqs.pipelines.resolvers import register_resolvers
 from eqs.pipelines.result import RunResult
 from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import Run, finished_runs
-from eqs.pipelines.train import build_task
+from eqs.pipelines.train import build_task, train
 from eqs.training import Binning, EvaluationDataset, WindowSource
 
 CONFIGS = Path(eqs.__file__).parent / "configs"

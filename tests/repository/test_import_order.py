@@ -19,6 +19,7 @@ ORDER = [
     {"training"},
     {"study"},
     {"pipelines"},
+    {"commands"},
 ]
 RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
 MODULES = sorted(ROOT.glob("*/**/*.py"))

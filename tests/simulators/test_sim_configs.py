@@ -1,4 +1,4 @@
-"""The parameter files mirror the parameters, and every preset composes."""
+"""The parameter files mirror the parameters, and every setting composes."""
 
 from dataclasses import fields
 from itertools import pairwise
@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 import yaml
 from hydra import compose, initialize_config_dir
+from hydra.errors import MissingConfigException
 from hydra.utils import instantiate
 
 from eqs.data import RecordedEvents
+from eqs.pipelines.resolvers import register_resolvers
 from eqs.simulators import (
     CARLA,
     ESIM,
@@ -40,31 +42,26 @@ SIMULATORS = {
     "vid2e": Vid2E,
 }
 READOUTS = {"bottleneck": Bottleneck, "row": RowReadout, "synchronous": SynchronousReadout}
-PRESETS = sorted(path.stem for path in (CONFIGS / "sim_preset").glob("*.yaml"))
-
-CHANGED = (
-    *(f"{name}_dsec" for name in ("esim", "v2e", "prophesee", "icns", "improved_esim")),
-    "esim_noisy",
-    "v2e_paper",
-    "v2e_clean",
-    "v2e_noisy",
-    "prophesee_clean",
-    "prophesee_noisy",
-    "dvs_voltmeter_clean",
-    "dvs_voltmeter_davis240",
-    "icns_clean",
-    "improved_esim_clean",
+SETTINGS = sorted(
+    path.relative_to(CONFIGS / "sim").with_suffix("").as_posix()
+    for path in (CONFIGS / "sim").glob("*/*.yaml")
 )
 
 
-def composed(tmp_path, *overrides):
-    """What a program gets whose defaults name a simulator and a preset."""
-    (tmp_path / "main.yaml").write_text(
-        "defaults: [_self_, {sim: esim}, {preset: default}, {sim_preset: '${sim}_${preset}'}]\n"
-        f"hydra: {{searchpath: ['file://{CONFIGS}']}}\nseed: 7\n"
-    )
-    with initialize_config_dir(str(tmp_path), version_base=None):
-        return compose("main", overrides=list(overrides))
+def composed(*overrides, program="train"):
+    """What a program gets."""
+    register_resolvers()
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        return compose(program, [*overrides])
+
+
+def stated(name):
+    """What a simulator's file and the one that it builds on say."""
+    files = [CONFIGS / "base" / "simulator.yaml", CONFIGS / "sim" / f"{name}.yaml"]
+    read = [yaml.safe_load(path.read_text()) for path in files]
+    assert read[1].pop("defaults") == ["/base/simulator@_here_", "_self_"]
+    assert not read[0].keys() & read[1].keys()
+    return {**read[0], **read[1]}
 
 
 def test_the_recorded_events_have_nothing_to_set():
@@ -76,7 +73,7 @@ def test_the_recorded_events_have_nothing_to_set():
 @pytest.mark.parametrize("name", SIMULATORS)
 def test_a_parameter_file_has_exactly_the_defaults(name):
     kind = SIMULATORS[name]
-    values = yaml.safe_load((CONFIGS / "sim" / f"{name}.yaml").read_text())
+    values = stated(name)
     assert values.pop("_target_") == f"eqs.simulators.{kind.__name__}"
     assert kind.name == name
     expected = {field.name: field.default for field in fields(kind)}
@@ -91,11 +88,11 @@ def test_a_parameter_file_has_exactly_the_defaults(name):
     }
 
 
-@pytest.mark.parametrize("name", SIMULATORS)
-def test_every_parameter_has_a_comment_with_source_and_range(name):
-    lines = (CONFIGS / "sim" / f"{name}.yaml").read_text().splitlines()
+@pytest.mark.parametrize("file", ["base/simulator", *(f"sim/{name}" for name in SIMULATORS)])
+def test_every_parameter_has_a_comment_with_source_and_range(file):
+    lines = (CONFIGS / f"{file}.yaml").read_text().splitlines()
     for above, line in pairwise(lines):
-        if not line.startswith(("#", "_target_", "mode", "seed")):
+        if line and not line.startswith(("#", "_target_", "mode", "seed", "defaults", "  - ")):
             assert above.startswith("# "), line
             assert "Source: " in above, line
             assert any(word in above for word in ("Typical ", "Range ", "One of ")), line
@@ -134,34 +131,37 @@ def test_every_simulator_has_a_parameter_file():
     assert {path.stem for path in (CONFIGS / "sim").glob("*.yaml")} == {*SIMULATORS, "real"}
 
 
-@pytest.mark.parametrize("pair", PRESETS)
-def test_every_preset_composes_and_builds(tmp_path, pair):
-    name, _, preset = pair.rpartition("_")
-    config = composed(tmp_path, f"sim={name}", f"preset={preset}")
-    simulator = instantiate(config.sim)
-    assert simulator.name == name
-    defaults = instantiate(composed(tmp_path, f"sim={name}").sim)
-    assert (simulator == defaults) == (pair not in CHANGED)
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_every_setting_changes_its_simulator_wherever_that_stands(setting):
+    name = setting.partition("/")[0]
+    simulator = instantiate(composed(f"sim={setting}").sim)
+    plain = instantiate(composed(f"sim={name}").sim)
+    assert simulator.name == plain.name == name
+    assert simulator != plain
+    elsewhere = composed(f"+sim@simulators.mine={setting}", program="evaluate").simulators.mine
+    assert instantiate(elsewhere) == simulator
+    text = (CONFIGS / "sim" / f"{setting}.yaml").read_text()
+    own = {key: value for key, value in yaml.safe_load(text).items() if key != "defaults"}
+    assert all(getattr(simulator, key) == value for key, value in own.items())
+    changed = {key for key in own if getattr(simulator, key) != getattr(plain, key)}
+    assert changed
 
 
-def test_every_simulator_has_default_and_paper():
-    assert {f"{name}_{preset}" for name in SIMULATORS for preset in ("default", "paper")} <= set(
-        PRESETS
-    )
-    words = {path.stem for path in (CONFIGS / "preset").glob("*.yaml")}
-    assert {pair.rpartition("_")[2] for pair in PRESETS} == words
-
-
-def test_the_paper_preset_states_the_papers_thresholds(tmp_path):
-    simulator = instantiate(composed(tmp_path, "sim=v2e", "preset=paper").sim)
+def test_the_setting_of_the_paper_has_its_thresholds():
+    simulator = instantiate(composed("sim=v2e/paper", "seed=7").sim)
     assert (simulator.threshold_on_log, simulator.threshold_off_log) == (0.3, 0.3)
     assert simulator.threshold_sigma_log == 0.03
     assert simulator.seed == 7
 
 
-def test_the_command_line_overrides_a_preset(tmp_path):
-    config = composed(tmp_path, "sim=v2e", "preset=paper", "sim.threshold_on_log=0.25")
+def test_the_command_line_overrides_a_setting():
+    config = composed("sim=v2e/paper", "sim.threshold_on_log=0.25")
     assert instantiate(config.sim).threshold_on_log == 0.25
+
+
+def test_an_unknown_setting_is_refused_by_hydra_with_those_that_there_are():
+    with pytest.raises(MissingConfigException, match=r"Could not find 'sim/v2e/papre'"):
+        composed("sim=v2e/papre")
 
 
 def test_the_experiment_of_all_simulators_leaves_none_out():

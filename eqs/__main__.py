@@ -1,0 +1,5 @@
+"""`python -m eqs` is the command `eqs`."""
+
+from eqs.commands import main
+
+main()

@@ -1,0 +1,93 @@
+"""Verbs that Hydra configures: what is typed becomes a configuration, and a pipeline gets it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+
+
+def as_typed(arguments: Sequence[str]) -> list[str]:
+    """Nothing to translate."""
+    return list(arguments)
+
+
+def with_flags(arguments: Sequence[str]) -> list[str]:
+    """Flags as the keys they stand for, wherever they are typed."""
+    flags = {"--eqs": "score=true", "--sanity": "sanity=true"}
+    return [flags.get(argument, argument) for argument in arguments]
+
+
+def with_files(arguments: Sequence[str]) -> list[str]:
+    """The first two plain arguments as the files they name, simulated and real."""
+    names = iter(("simulated", "real"))
+    translated = []
+    for argument in arguments:
+        plain = "=" not in argument and not argument.startswith("-")
+        name = next(names, None) if plain else None
+        translated.append(f"{name}={argument}" if name else argument)
+    return translated
+
+
+@dataclass(frozen=True, kw_only=True)
+class Configured:
+    """A verb that Hydra configures.
+
+    Args:
+        config: its configuration, a file of `eqs/configs`.
+        module: module below `eqs.pipelines` with its pipeline.
+        pipeline: the function that gets the configuration.
+        translate: turns what is typed into what Hydra reads, which is only `key=value`.
+    """
+
+    config: str
+    module: str
+    pipeline: str
+    translate: Callable[[Sequence[str]], list[str]] = as_typed
+
+
+CONFIGURED = {
+    "train": Configured(config="train", module="train", pipeline="train"),
+    "evaluate": Configured(
+        config="evaluate", module="evaluate", pipeline="evaluate", translate=with_flags
+    ),
+    "prepare": Configured(config="prepare", module="prepare", pipeline="prepare"),
+    "simulate": Configured(config="simulate", module="simulate", pipeline="simulate"),
+    "score": Configured(
+        config="score", module="score_files", pipeline="score_files", translate=with_files
+    ),
+    "calibrate": Configured(config="calibrate", module="calibrate", pipeline="calibrate"),
+}
+
+
+def run_configured(verb: str, arguments: Sequence[str]) -> None:
+    """Compose the configuration of a verb and hand it to its pipeline."""
+    import hydra
+
+    from eqs.pipelines.keys import keys_explained
+    from eqs.pipelines.resolvers import register_resolvers
+
+    command, typed = CONFIGURED[verb], list(sys.argv)
+    register_resolvers()
+
+    @hydra.main(version_base="1.3", config_path=str(CONFIGS), config_name=command.config)
+    def compose_and_run(cfg: DictConfig) -> object:
+        sys.argv = typed  # processes that Lightning starts type the same command again
+        module = import_module(f"eqs.pipelines.{command.module}")
+        return getattr(module, command.pipeline)(cfg)
+
+    given = command.translate(arguments)
+    sys.argv = [typed[0], *given]
+    try:
+        with keys_explained(given):
+            compose_and_run()
+    finally:
+        sys.argv = typed
