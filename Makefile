@@ -21,7 +21,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@echo "installing into $(VENV), which takes a few minutes"
 	@start=$$(date +%s) \
 	&& $(PYTHON) -m venv $(VENV) \
-	&& $(VENV)/bin/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[dev]' \
+	&& $(VENV)/bin/python -m pip install --quiet $(PIP_ARGS) -c constraints.txt -e '.[all,dev]' \
 	&& echo $$(($$(date +%s) - start)) > $@
 
 study: install ## Run the whole study on dsec_mini: generate, simulate, train, score, report

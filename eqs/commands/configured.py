@@ -9,6 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from eqs.extras import needed
+
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
@@ -81,7 +83,11 @@ def run_configured(verb: str, arguments: Sequence[str]) -> None:
     @hydra.main(version_base="1.3", config_path=str(CONFIGS), config_name=command.config)
     def compose_and_run(cfg: DictConfig) -> object:
         sys.argv = typed  # processes that Lightning starts type the same command again
-        module = import_module(f"eqs.pipelines.{command.module}")
+        try:
+            with needed("all", f"for eqs {verb}"):
+                module = import_module(f"eqs.pipelines.{command.module}")
+        except ValueError as error:
+            sys.exit(str(error))
         return getattr(module, command.pipeline)(cfg)
 
     given = command.translate(arguments)

@@ -9,6 +9,7 @@ from importlib import import_module
 
 from eqs.commands.configured import CONFIGURED, run_configured
 from eqs.commands.help_page import configured_page, purpose
+from eqs.extras import needed
 
 # Verbs with a command line of their own: module below eqs.commands, and what they do.
 PLAIN = {
@@ -44,7 +45,12 @@ def run(verb: str, arguments: Sequence[str] | None = None, shown: str | None = N
     arguments = sys.argv[1:] if arguments is None else arguments
     shown = shown or f"python {sys.argv[0]}"
     if verb in PLAIN:
-        import_module(f"eqs.commands.{verb}").main(arguments, shown)
+        try:
+            with needed("all", f"for eqs {verb}"):
+                command = import_module(f"eqs.commands.{verb}")
+        except ValueError as error:
+            sys.exit(str(error))
+        command.main(arguments, shown)
     elif any(each in HELP for each in arguments):
         sys.stdout.write(configured_page(CONFIGURED[verb].config, shown))
     else:

@@ -9,8 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from eqs.drawing.style import MARKERS, REFERENCE, STYLE, colours, figure
+from eqs.drawing.style import MARKERS, STYLE, colours, figure
 from eqs.events import Events
+from eqs.names import REFERENCE
 
 
 def event_rate(events: Events, start_us: int, stop_us: int, bin_us: int) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw
 from eqs.drawing.pictures import Boxes, above, box_colour, event_image
 from eqs.drawing.style import BRIGHTER, DARKER
 from eqs.events import EventReader, Events
+from eqs.extras import needed
 
 Picture = NDArray[np.uint8]
 STILLS = 8  # in a strip
@@ -124,13 +125,8 @@ def _write_gif(path: Path, pictures: Sequence[Picture], frames_per_second: float
 
 
 def _write_mp4(path: Path, pictures: Sequence[Picture], frames_per_second: float) -> None:
-    try:
+    with needed("video", "to write an MP4 (a GIF needs none)"):
         import av
-    except ModuleNotFoundError as error:
-        raise ValueError(
-            "Expected PyAV to write an MP4, found none; install it with pip install av, or choose "
-            "a name that ends in .gif"
-        ) from error
     height, width = pictures[0].shape[:2]
     with av.open(str(path), "w") as container:
         stream = container.add_stream("h264", rate=max(1, round(frames_per_second)))

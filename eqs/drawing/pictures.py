@@ -15,8 +15,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike, NDArray
 
-from eqs.drawing.style import BRIGHTER, DARKER, REFERENCE, STYLE, figure
+from eqs.drawing.style import BRIGHTER, DARKER, STYLE, figure
 from eqs.events import Events
+from eqs.names import REFERENCE
 
 # Away from the red and blue of the events.
 BOX_COLOURS = ("#007a5a", "#c46a00", "#8e3a87", "#5c4a1e", "#00838f", "#4a4a4a")

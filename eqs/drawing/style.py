@@ -10,8 +10,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-REFERENCE = "real"
-"""The real sensor's place among the systems that are drawn or tabulated."""
+from eqs.names import REFERENCE
 
 DARKER = "#d7301f"
 """Events of pixels that became darker, as in the paper."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.extras import needed
 from eqs.frames.interpolation import (
     Frame,
     displacement_factor,
@@ -59,13 +60,8 @@ class FlowInterpolation:
                 f"Expected largest_step_px above 0, got {self.largest_step_px!r}; "
                 "set interpolation.largest_step_px"
             )
-        try:
+        with needed("flow", "for optical flow (interpolation=linear needs none)"):
             import cv2  # noqa: F401
-        except ModuleNotFoundError as error:
-            raise ValueError(
-                "Expected OpenCV for optical flow, found none; install it with "
-                "pip install opencv-python-headless, or set interpolation=linear"
-            ) from error
 
     def between(self, first: Frame, second: Frame) -> Frame:
         """See `Interpolation`."""

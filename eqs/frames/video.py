@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.extras import needed
+
 
 class VideoFile:
     """A video, decoded a few frames at a time, with the times that the file gives its frames.
@@ -31,13 +33,8 @@ class VideoFile:
         self.path, self.chunk = Path(path), chunk
         if not self.path.is_file():
             raise FileNotFoundError(f"Expected a video at {self.path}, found none; set frames")
-        try:
+        with needed("video", f"to decode {self.path} (a folder of images needs none)"):
             import av  # noqa: F401
-        except ModuleNotFoundError as error:
-            raise ValueError(
-                f"Expected PyAV to decode {self.path}, found none; install it with pip install av, "
-                "or give a folder of images"
-            ) from error
 
     def __len__(self) -> int:
         """Number of frames that the file states, 0 where it states none."""

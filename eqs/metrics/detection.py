@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from faster_coco_eval import COCO, COCOeval_faster
 from numpy.typing import NDArray
 from torch import Tensor
 from torchmetrics import Metric
 from torchmetrics.utilities import dim_zero_cat
+
+from eqs.extras import needed
+
+if TYPE_CHECKING:
+    from faster_coco_eval import COCO
 
 AREAS = ("all", "small", "medium", "large")
 
@@ -63,6 +67,8 @@ class MeanAveragePrecision(Metric):
         **kwargs: object,
     ) -> None:
         """Check the options and prepare the lists of frames."""
+        with needed("train", "to compute a mAP"):
+            import faster_coco_eval  # noqa: F401
         super().__init__(**kwargs)
         if max_detections < 1:
             raise ValueError(f"Expected max_detections of at least 1, got {max_detections}")
@@ -188,6 +194,8 @@ def _precision(
     """Precision by (IoU, recall, class, area); -1 where there is no ground truth."""
     if not sum(map(len, truths)):
         return np.full((10, 101, len(classes), len(AREAS)), -1.0)
+    from faster_coco_eval import COCOeval_faster
+
     evaluation = COCOeval_faster(
         _dataset(truths, classes),
         _dataset(detections, classes),
@@ -202,6 +210,8 @@ def _precision(
 
 def _dataset(frames: Sequence[NDArray[np.float32]], classes: Sequence[int]) -> COCO:
     """Boxes as the COCO toolkit wants them; ids start at 1 because 0 means unmatched there."""
+    from faster_coco_eval import COCO
+
     annotations: list[dict[str, Any]] = []
     for image_id, rows in enumerate(frames, start=1):
         sides = rows[:, 2:4].astype(np.float64) - rows[:, :2]

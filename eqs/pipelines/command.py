@@ -14,6 +14,7 @@ from hydra.errors import InstantiationException
 from omegaconf import DictConfig
 from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
 
+from eqs.extras import lacking
 from eqs.pipelines.keys import in_this_command
 
 log = logging.getLogger(__name__)
@@ -59,6 +60,8 @@ def sentence(error: BaseException, cfg: DictConfig, where: str = "") -> str:
         place = str(error).rpartition("full_key: ")[2].strip() if "full_key: " in str(error) else ""
         message = sentence(error.__cause__, cfg, place)
         return f"{message} (config key {place})" if place else message
+    if isinstance(error, ModuleNotFoundError):  # an optional package of Lightning's
+        return lacking(error, "all", f"for {where}" if where else "for this")
     if isinstance(error, TypeError | AttributeError):  # of a constructor: a text for a number
         return f"Expected values of the configured kinds, got another: {error}; set them anew"
     if isinstance(error, MissingMandatoryValue):

@@ -13,6 +13,7 @@ from omegaconf import DictConfig
 from rich.console import Console
 
 from eqs.data import EventSource
+from eqs.names import BASELINE
 from eqs.pipelines.build import Dataset, dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import find_scoring
@@ -22,7 +23,7 @@ from eqs.pipelines.runs import Run, finished_runs, recipe_hash
 from eqs.pipelines.sanity import sanity
 from eqs.pipelines.score import score_recordings
 from eqs.pipelines.timing import phase_times
-from eqs.study import BASELINE, eqs_table, print_eqs, print_study, study_table, write_table
+from eqs.study import eqs_table, print_eqs, print_study, study_table, write_table
 
 log = logging.getLogger(__name__)
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import csv
+import logging
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
 from omegaconf import DictConfig
 from rich.console import Console
 from rich.table import Table
 
-from eqs.drawing import save_figure, score_curve, score_maps
 from eqs.events import EventReader
+from eqs.extras import DISTRIBUTION
 from eqs.files import write_json
-from eqs.metrics import window_starts
+from eqs.metrics import StreamScore, window_starts
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import score_anchors
-from eqs.study import write_table
+
+log = logging.getLogger(__name__)
 
 
 @explained
@@ -63,28 +65,38 @@ def score_files(cfg: DictConfig) -> None:
             "weights_sha256": scoring.judge.weights_sha256,
         },
     )
-    window_us = headline.window_us
-    number = np.arange(len(result.curve))
-    curve = {
-        "stop_us": span[0] + (number + 1) * window_us,
-        "eqs": result.curve,
-        "counts": number >= result.warmup,
-    }
-    write_table(pd.DataFrame(curve), out / "curve.csv")
-    panel = {"simulated": result.map}
-    drawn = score_maps(None, panel, patch_px=result.patch_px, height=height, width=width)
-    save_figure(drawn, out, "map")
-    save_figure(
-        score_curve(
-            result.curve,
-            warmup=result.warmup,
-            window_us=window_us,
-            ceiling=known["ceiling"][scoring.headline.name],
-        ),
-        out,
-        "curve",
-    )
+    write_curve(out / "curve.csv", result, span[0], headline.window_us)
     show(scores, known, counts, scoring, Console())
+    ceiling = known["ceiling"][scoring.headline.name]
+    if find_spec("matplotlib") is None:
+        log.info("no figures: they take pip install '%s[report]'", DISTRIBUTION)
+    else:
+        draw(out, result, window_us=headline.window_us, ceiling=ceiling, size=(height, width))
+
+
+def write_curve(path: Path, score: StreamScore, start_us: int, window_us: int) -> None:
+    """Write the score of every window and whether it counts; the file appears when complete."""
+    partial = path.with_name(path.name + ".partial")
+    with partial.open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(("stop_us", "eqs", "counts"))
+        for number, value in enumerate(score.curve.tolist()):
+            stop_us = start_us + (number + 1) * window_us
+            rows.writerow((stop_us, value, number >= score.warmup))
+    partial.replace(path)
+
+
+def draw(
+    out: Path, score: StreamScore, *, window_us: int, ceiling: float, size: tuple[int, int]
+) -> None:
+    """Draw where and when the streams differ."""
+    from eqs.drawing import save_figure, score_curve, score_maps
+
+    maps = {"simulated": score.map}
+    drawn = score_maps(None, maps, patch_px=score.patch_px, height=size[0], width=size[1])
+    save_figure(drawn, out, "map")
+    curve = score_curve(score.curve, warmup=score.warmup, window_us=window_us, ceiling=ceiling)
+    save_figure(curve, out, "curve")
 
 
 def show(

@@ -17,8 +17,6 @@ from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
 from eqs.study.sanity import order_faults, sanity_figure, sanity_table, severity_correlations
 from eqs.study.tables import (
-    BASELINE,
-    REFERENCE,
     Drops,
     drops,
     eqs_table,
@@ -32,9 +30,7 @@ from eqs.study.tables import (
 )
 
 __all__ = [
-    "BASELINE",
     "FIGURE_TEXTS",
-    "REFERENCE",
     "TARGETS",
     "Correlation",
     "Drops",

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from eqs.drawing.style import MARKERS, STYLE, colours, figure
+from eqs.names import REFERENCE
 from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
-from eqs.study.tables import REFERENCE, simulated, summarise_eqs, summarise_study
+from eqs.study.tables import simulated, summarise_eqs, summarise_study
 
 # Column, axis label, factor from the table's unit to the axis.
 PANELS = (

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from eqs.names import BASELINE
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.tables import (
-    BASELINE,
     MAP_COLUMNS,
     RATIO_FLOOR,
     REFERENCE,

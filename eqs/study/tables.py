@@ -11,10 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from eqs.drawing.style import REFERENCE
-
-BASELINE = "baseline_"
-"""How the columns of EQS's rivals begin."""
+from eqs.names import BASELINE, REFERENCE
 
 RATIO_FLOOR = 0.10
 """Below this simulated mAP a ratio to it rests on too little to be read."""

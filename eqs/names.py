@@ -1,0 +1,7 @@
+"""Names that stand in tables, figures and configurations alike."""
+
+REFERENCE = "real"
+"""The system without a simulator: the recorded events themselves."""
+
+BASELINE = "baseline_"
+"""What the column of a baseline begins with."""
