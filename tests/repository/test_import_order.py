@@ -1,57 +1,110 @@
-"""The layers of the package: a module imports only packages to its left."""
+"""The rooms of the package: which imports which, exactly, and that no circle is among modules."""
 
-import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from import_graph import circle, graph, imports, main, room
 
-import eqs
-
-ROOT = Path(eqs.__file__).parent
-ORDER = [
-    {"events"},
-    {"frames", "representations", "drawing"},
-    {"simulators"},
-    {"scenes"},
-    {"data"},
-    {"models"},
-    {"metrics"},
-    {"training"},
-    {"study"},
-    {"pipelines"},
-    {"commands"},
-]
-RANK = {name: rank for rank, names in enumerate(ORDER) for name in names}
-MODULES = sorted(ROOT.glob("*/**/*.py"))
-
-
-def imported_packages(source: str) -> set[str]:
-    """First-level packages of eqs that a module's source imports."""
-    names = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name.split(".")[1] for name in names if name.startswith("eqs.")} & set(RANK)
-
-
-def test_every_package_has_a_place() -> None:
-    folders = {path.parent.name for path in ROOT.glob("*/__init__.py")}
-    assert folders == set(RANK)
+# A room imports rooms that stand above it here, and these alone: whoever adds an arrow says so.
+ROOMS = {
+    "eqs": "",
+    "eqs.names": "",
+    "eqs.extras": "",
+    "eqs.files": "",
+    "eqs.processors": "",
+    "eqs.events": "",
+    "eqs.frames": "extras files",
+    "eqs.representations": "events",
+    "eqs.drawing": "events extras names",
+    "eqs.simulators.streaming": "events frames processors",
+    "eqs.simulators.pixel": "frames processors simulators.streaming",
+    "eqs.simulators": "events frames simulators.pixel simulators.streaming",
+    "eqs.scenes": "events files processors",
+    "eqs.data": "events files frames processors simulators",
+    "eqs.models": "",
+    "eqs.metrics.baselines": "events metrics",
+    "eqs.metrics": "events extras files models representations",
+    "eqs.training": "data drawing events files metrics models representations",
+    "eqs.study": "drawing names",
+    "eqs.pipelines": "data drawing events extras files frames metrics metrics.baselines models "
+    "names processors simulators study training",
+    "eqs.commands": "data drawing events extras pipelines",
+    "eqs.__main__": "commands",
+}
+# The published models: each builds on the simulator, its parts and the stream, and on no other.
+MODELS = ("dvs_voltmeter", "esim", "icns", "improved_esim", "prophesee", "v2e")
+MODEL = "frames simulators simulators.pixel simulators.streaming"
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_run_downwards(path: Path) -> None:
-    package = path.relative_to(ROOT).parts[0]
-    above = {
-        name
-        for name in imported_packages(path.read_text())
-        if name != package and RANK[name] >= RANK[package]
-    }
-    assert not above, f"eqs.{package} imports {above}, which stands to its right"
+def expected() -> dict[str, set[str]]:
+    """Every room with those that it may import."""
+    lines = {**ROOMS, **{f"eqs.simulators.{model}": MODEL for model in MODELS}}
+    lines["eqs.simulators"] += "".join(f" simulators.{model}" for model in MODELS)
+    return {name: {f"eqs.{each}" for each in line.split()} for name, line in lines.items()}
 
 
-def test_an_upward_import_would_be_found() -> None:
-    source = "from eqs.training import x\nimport eqs.models.rvt"
-    assert imported_packages(source) == {"training", "models"}
+def rooms() -> dict[str, set[str]]:
+    """Every room with those that it imports, `eqs` itself (its version) left out."""
+    found: dict[str, set[str]] = {}
+    for name, imported in graph().items():
+        found.setdefault(room(name), set()).update(room(each) for each in imported)
+    return {name: others - {name, "eqs"} for name, others in found.items()}
+
+
+def test_the_rooms_are_those_that_are_written_down() -> None:
+    assert rooms().keys() == expected().keys()
+
+
+@pytest.mark.parametrize("name", expected())
+def test_a_room_imports_what_is_written_down(name: str) -> None:
+    assert rooms()[name] == expected()[name]
+
+
+def test_no_module_needs_one_that_needs_it() -> None:
+    assert circle(graph(at_once=True)) == []
+
+
+def test_arrows_and_circles_are_found() -> None:
+    known = {"eqs.a", "eqs.a.b", "eqs.c"}
+    source = (
+        "from eqs.a import b\nif TYPE_CHECKING:\n    import eqs.c\n"
+        "def f():\n    from eqs.c import thing\n"
+    )
+    assert imports(source, known) == {"eqs.a.b", "eqs.c"}
+    assert imports(source, known, at_once=True) == {"eqs.a.b"}
+    assert set(circle({"eqs.a": {"eqs.c"}, "eqs.c": {"eqs.a"}})) == {"eqs.a", "eqs.c"}
+    # Who imports a part of a package from outside needs the whole of it.
+    assert circle({"eqs.a": {"eqs.a.b"}, "eqs.a.b": {"eqs.c"}, "eqs.c": {"eqs.a.b"}})
+
+
+def test_the_command_prints_the_graph(capsys: pytest.CaptureFixture[str]) -> None:
+    main()
+    printed = capsys.readouterr().out
+    assert "no circles" in printed
+    assert all(f"{name} " in printed for name in ROOMS)
+
+
+@pytest.mark.parametrize(
+    ("module", "unwanted"),
+    [
+        ("eqs.simulators", {"torch", "pandas", "matplotlib", "scipy"}),
+        ("eqs.data", {"torch", "pandas", "matplotlib"}),
+        ("eqs.drawing", {"torch", "pandas", "scipy", "jinja2", "lightning"}),
+        ("eqs.metrics", {"lightning", "pandas", "jinja2", "faster_coco_eval"}),
+        ("eqs.study", {"torch", "lightning"}),
+    ],
+)
+def test_what_a_room_does_not_load(module: str, unwanted: set[str]) -> None:
+    code = f"import sys, {module}; print(*sorted({unwanted!r} & {{*sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_the_tree_in_contributing_is_true() -> None:
+    text = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text()
+    for name in expected():
+        folder = name.replace(".", "/")
+        if (Path(__file__).parents[2] / folder).is_dir() and name != "eqs":
+            assert f"{folder.rpartition('/')[2]}/" in text, name
