@@ -89,7 +89,7 @@ def test_the_command_prints_the_graph(capsys: pytest.CaptureFixture[str]) -> Non
 @pytest.mark.parametrize(
     ("module", "unwanted"),
     [
-        ("eqs.simulators", {"torch", "pandas", "matplotlib", "scipy"}),
+        ("eqs.simulators", {"torch", "pandas", "matplotlib"}),
         ("eqs.data", {"torch", "pandas", "matplotlib"}),
         ("eqs.drawing", {"torch", "pandas", "scipy", "jinja2", "lightning"}),
         ("eqs.metrics", {"lightning", "pandas", "jinja2", "faster_coco_eval"}),
