@@ -7,9 +7,11 @@ from eqs.metrics.definition import ACTIVATIONS, Definition
 from eqs.metrics.detection import MeanAveragePrecision
 from eqs.metrics.eqs import EventQualityScore
 from eqs.metrics.features import TappedBackbone, pooled_features
-from eqs.metrics.judge import Judge, RVTShape, weights_sha256
+from eqs.metrics.judge import Judge
+from eqs.metrics.network import RVTShape, weights_sha256
 from eqs.metrics.pooling import pool_grid, pool_patches, smooth_grid, smooth_patches
-from eqs.metrics.scoring import Reading, StreamScore, score_group, score_streams, score_tensors
+from eqs.metrics.reading import Reading
+from eqs.metrics.scoring import StreamScore, score_group, score_streams, score_tensors
 from eqs.metrics.similarity import combine_maps, mean_over_stages, patch_cosine, whitening_matrix
 from eqs.metrics.windows import group_chunks, histogram_chunks, normalised_counts, window_starts
 

@@ -13,7 +13,8 @@ from torchmetrics import Metric
 
 from eqs.metrics.definition import Definition, choices
 from eqs.metrics.judge import Judge
-from eqs.metrics.scoring import Reading, StreamScore, Watcher, score_streams, score_tensors
+from eqs.metrics.reading import Reading
+from eqs.metrics.scoring import StreamScore, Watcher, score_streams, score_tensors
 from eqs.metrics.windows import StreamOrHistograms
 
 log = logging.getLogger(__name__)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -11,34 +10,14 @@ from typing import Any, Self
 import torch
 from torch import nn
 
-from eqs.files import read_json, write_json
 from eqs.metrics.centre import Centre, feature_centres
 from eqs.metrics.definition import Definition, choices
 from eqs.metrics.features import TappedBackbone
-from eqs.metrics.scoring import Reading
+from eqs.metrics.judge_folder import RECORD, WEIGHTS, file_of, read_judge, write_judge
+from eqs.metrics.network import RVTShape, trained_backbone, untrained_backbone, weights_sha256
+from eqs.metrics.reading import Reading
 from eqs.metrics.windows import StreamOrHistograms
-
-RECORD, WEIGHTS = "judge.json", "weights.ckpt"
-
-
-@dataclass(frozen=True, kw_only=True)
-class RVTShape:
-    """What a file of RVT's weights does not say, or not by itself, about their network.
-
-    Args:
-        size: tiny, small or base.
-        bins: time bins per polarity, half the input channels.
-        partition_split_32: attention windows per side of the backbone's last stage.
-    """
-
-    size: str = "small"
-    bins: int = 10
-    partition_split_32: int = 2
-
-    @property
-    def architecture(self) -> str:
-        """The name that a definition knows it by."""
-        return f"rvt-{self.size}-split{self.partition_split_32}"
+from eqs.models import RVTBackbone
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,17 +69,8 @@ class Judge:
             seed: seed of the weights.
             **shape: see `RVTShape`.
         """
-        from eqs.models import RVTDetector  # torch's modules, which reading a record does without
-
         built = RVTShape(**shape)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            model = RVTDetector(
-                size=built.size,
-                in_channels=2 * built.bins,
-                partition_split_32=built.partition_split_32,
-            )
-        return cls._of_rvt(model.backbone, built, "random weights, a control")
+        return cls._of_rvt(untrained_backbone(built, seed), built, "random weights, a control")
 
     @classmethod
     def from_checkpoint(cls, path: Path | str, partition_split_32: int = 2) -> Self:
@@ -114,18 +84,13 @@ class Judge:
             FileNotFoundError: there is no such file.
             ValueError: the file holds no detector of a known size.
         """
-        from eqs.models import backbone_from_checkpoint
-
-        backbone, size = backbone_from_checkpoint(path, partition_split_32)
-        shape = RVTShape(
-            size=size, bins=backbone.in_channels // 2, partition_split_32=partition_split_32
-        )
+        backbone, shape = trained_backbone(path, partition_split_32)
         return cls._of_rvt(backbone, shape, f"weights of {Path(path).name}")
 
     @classmethod
-    def _of_rvt(cls, backbone: nn.Module, shape: RVTShape, description: str) -> Self:
+    def _of_rvt(cls, backbone: RVTBackbone, shape: RVTShape, description: str) -> Self:
         return cls(
-            backbone=backbone.eval().requires_grad_(False),  # type: ignore[arg-type]
+            backbone=backbone,
             definition=Definition(bins=shape.bins, architecture=shape.architecture),
             weights_sha256=weights_sha256(backbone),
             shape=shape,
@@ -150,7 +115,7 @@ class Judge:
         folder = path.parent if path.name == WEIGHTS else path
         given = {} if partition_split_32 is None else {"partition_split_32": partition_split_32}
         if (folder / RECORD).is_file():
-            judge = cls._of_folder(folder)
+            judge = cls(**read_judge(folder))
             trained = judge._rvt_shape().partition_split_32
             if partition_split_32 not in (None, trained):
                 raise ValueError(
@@ -167,67 +132,16 @@ class Judge:
             )
         return cls.from_checkpoint(path, **given)
 
-    @classmethod
-    def _of_folder(cls, folder: Path) -> Self:
-        from eqs.models import backbone_from_checkpoint
-
-        record = read_json(folder / RECORD)
-        try:
-            shape = RVTShape(**record["network"])
-            stages = tuple(record["definition"].pop("stages"))
-            definition = Definition(**record["definition"], stages=stages)
-            files, description = record["centres"], record["description"]
-            digest, weights = record["weights_sha256"], folder / record["weights"]
-        except (KeyError, TypeError) as error:
-            raise ValueError(
-                f"Expected a judge written by this package in {folder}, got a {RECORD} that "
-                f"lacks or adds {error}; delete that file and type the command again"
-            ) from error
-        backbone, _ = backbone_from_checkpoint(weights, shape.partition_split_32)
-        judge = cls._of_rvt(backbone, shape, description)
-        centres = {name: Centre.load(folder / name) for name in files}
-        changed = [name for name, centre in centres.items() if centre.sha256 != files[name]]
-        if judge.weights_sha256 != digest:
-            changed.insert(0, weights.name)
-        if changed:
-            raise ValueError(
-                f"Expected the files of the judge in {folder} to match their hashes, got others "
-                f"in {', '.join(changed)}; set eqs.judge to another, or delete {RECORD}"
-            )
-        return replace(judge, definition=definition, centres=tuple(centres.values()))
-
     def save(self, folder: Path | str) -> None:
         """Write the folder that `load` reads; weights that lie there already are kept.
 
         Raises:
             ValueError: the network is no RVT, so nothing could build it again.
         """
-        shape, target = self._rvt_shape(), Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        if not self._weights_lie_in(target):
-            names = self.backbone.state_dict()  # type: ignore[attr-defined]
-            partial = target / f"{WEIGHTS}.partial"
-            torch.save({f"backbone.{name}": x.cpu() for name, x in names.items()}, partial)
-            partial.replace(target / WEIGHTS)
-        for centre in self.centres:
-            centre.save(target / _file_of(centre))
-        write_json(
-            target / RECORD,
-            {
-                "description": self.description,
-                "network": asdict(shape),
-                "definition": asdict(self.definition),
-                "weights": WEIGHTS,
-                "weights_sha256": self.weights_sha256,
-                "centres": {_file_of(centre): centre.sha256 for centre in self.centres},
-            },
-        )
-
-    def _weights_lie_in(self, folder: Path) -> bool:
-        if not (folder / WEIGHTS).is_file():
-            return False
-        found = Judge.from_checkpoint(folder / WEIGHTS, self._rvt_shape().partition_split_32)
-        return found.weights_sha256 == self.weights_sha256
+        shape = self._rvt_shape()
+        assert isinstance(self.backbone, RVTBackbone)  # as the shape says
+        parts = self.backbone, shape, self.definition, self.centres, self.description
+        write_judge(Path(folder), *parts)
 
     def define(self, **chosen: Any) -> Definition:  # noqa: ANN401
         """The judge's definition with other choices.
@@ -304,8 +218,8 @@ class Judge:
             chunk_windows=chunk_windows,
             device=self.device,
         )
-        new = {_file_of(centre): centre for centre in made.values()}
-        kept = {_file_of(centre): centre for centre in self.centres}
+        new = {file_of(centre): centre for centre in made.values()}
+        kept = {file_of(centre): centre for centre in self.centres}
         headline = replace(self.definition, features="centred")
         return replace(self, definition=headline, centres=tuple({**kept, **new}.values()))
 
@@ -339,21 +253,3 @@ class Judge:
         if isinstance(self.backbone, nn.Module):
             self.backbone.to(device)
         return self
-
-
-def weights_sha256(module: nn.Module) -> str:
-    """The sha256 of a module's named tensors, whatever file they came in.
-
-    Convention: it covers names, shapes, types and values in the order of the names.
-    """
-    digest = hashlib.sha256()
-    for name, tensor in sorted(module.state_dict().items()):
-        data = tensor.detach().cpu().contiguous()
-        digest.update(f"{name} {tuple(data.shape)} {data.dtype}".encode())
-        digest.update(data.reshape(-1).view(torch.uint8).numpy().tobytes())
-    return digest.hexdigest()
-
-
-def _file_of(centre: Centre) -> str:
-    """One file for each activation and way to pool."""
-    return "-".join(filter(None, ("centre", centre.tap, centre.features_hash))) + ".npz"

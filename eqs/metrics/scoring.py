@@ -10,10 +10,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from eqs.metrics.centre import Centre
 from eqs.metrics.definition import Definition
-from eqs.metrics.features import ACTIVE, TappedBackbone, pooled_features, strides_of
-from eqs.metrics.similarity import combine_maps, patch_cosine
+from eqs.metrics.features import TappedBackbone, pooled_features, strides_of
+from eqs.metrics.reading import Comparison, Reading, mean_over_patches
+from eqs.metrics.similarity import combine_maps
 from eqs.metrics.windows import StreamOrHistograms, group_chunks
 
 Watcher = Callable[[Mapping[str, Sequence[Tensor]]], None]
@@ -51,56 +51,6 @@ class StreamScore:
     def n_windows(self) -> int:
         """Windows that count."""
         return len(self.curve) - self.warmup
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reading:
-    """One way to read the same features: a definition with the centre it needs.
-
-    Args:
-        definition: every choice of the score.
-        centre: mean real feature; needed where the features are not raw.
-
-    Raises:
-        ValueError: the centre is missing, not asked for, of another tap or of features made
-            otherwise, or without the covariances that whiten.
-    """
-
-    definition: Definition
-    centre: Centre | None = None
-
-    def __post_init__(self) -> None:
-        """Check that definition and centre belong together."""
-        if (self.definition.features == "raw") != (self.centre is None):
-            wanted, got = ("a", "none") if self.centre is None else ("no", "one")
-            raise ValueError(
-                f"Expected {wanted} centre for {self.definition.features} features, got {got}; "
-                "set eqs.judge or eqs.features"
-            )
-        if self.centre is not None and self.centre.tap != self.definition.tap:
-            raise ValueError(
-                f"Expected a centre of tap {self.definition.tap}, got one of {self.centre.tap}; "
-                "set eqs.judge or eqs.tap"
-            )
-        if self.centre is not None and self.centre.features_hash not in (
-            "",
-            self.definition.features_hash,
-        ):
-            raise ValueError(
-                "Expected a centre of features pooled and binned as these are, got one of others; "
-                "set eqs.judge, or the keys from eqs.patch to eqs.state as when it was computed"
-            )
-        whitened = self.definition.features == "whitened"
-        if whitened and self.centre is not None and not self.centre.covariances:
-            raise ValueError(
-                "Expected a centre with covariances for whitened features, got means alone; "
-                "compute the centre again or set eqs.features=centred"
-            )
-
-    @property
-    def name(self) -> str:
-        """Name of the column in a table, for instance `hidden_centred`."""
-        return self.definition.column
 
 
 def score_group(
@@ -228,8 +178,8 @@ def score_tensors(
         backbone, chunks, taps=[definition.tap], definition=definition, device=device,
         gradients=True,
     ):  # fmt: skip
-        cosines = _Comparison(reading).cosines(pooled)
-        curves.append(torch.stack([_mean_over_patches(*each) for each in cosines], dim=-1)[:, 0])
+        cosines = Comparison(reading).cosines(pooled)
+        curves.append(torch.stack([mean_over_patches(*each) for each in cosines], dim=-1)[:, 0])
     counting = torch.cat(curves)[definition.warmup_of(windows) :]
     return counting.nanmean(dim=0).nan_to_num(nan=1.0).mean()
 
@@ -248,53 +198,11 @@ def _shared_pass(readings: Sequence[Reading]) -> Definition:
     return readings[0].definition
 
 
-class _Comparison:
-    """Compares pooled features as one reading says."""
-
-    def __init__(self, reading: Reading) -> None:
-        self.definition = reading.definition
-        self.nothing: list[Tensor | None] = [None] * len(self.definition.stages)
-        self.centres = self.whitenings = self.nothing
-        if reading.centre is not None:
-            self.centres = [*reading.centre.for_stages(self.definition.stages)]
-            if self.definition.features == "whitened":
-                self.whitenings = [*reading.centre.whitening(self.definition.stages)]
-
-    def cosines(self, pooled: Mapping[str, Sequence[Tensor]]) -> list[tuple[Tensor, Tensor]]:
-        """By stage each patch's cosine, and 1 where it counts.
-
-        Args:
-            pooled: by tap and stage (windows, streams, channels, rows, columns), the reference
-                first.
-
-        Returns:
-            Both of shape (windows, candidates, rows, columns).
-        """
-        found = []
-        maps, masks = pooled[self.definition.tap], pooled.get(ACTIVE, self.nothing)
-        stages = zip(maps, masks, self.centres, self.whitenings, strict=True)
-        for stage, active, centre, whitening in stages:
-            cosine = patch_cosine(stage[:, 1:], stage[:, :1], centre, whitening).double()
-            if not torch.isfinite(cosine).all():
-                raise ValueError(
-                    "Expected finite features, got NaN or infinity; set eqs.judge to a sound one"
-                )
-            counts = torch.ones_like(cosine)
-            if active is not None:
-                counts = (active[:, 1:, 0] | active[:, :1, 0]).double()
-            found.append((cosine, counts))
-        return found
-
-
-def _mean_over_patches(cosine: Tensor, counts: Tensor) -> Tensor:
-    return (cosine * counts).sum(dim=(-2, -1)) / counts.sum(dim=(-2, -1))
-
-
 class _Tally:
     """Running sums of one reading over the chunks of a group of streams."""
 
     def __init__(self, reading: Reading, warmup: int, strides: Sequence[int]) -> None:
-        self.comparison, self.definition = _Comparison(reading), reading.definition
+        self.comparison, self.definition = Comparison(reading), reading.definition
         self.warmup, self.strides = warmup, strides
         self.curves: list[Tensor] = []
         self.sums: list[Tensor] = []
@@ -306,7 +214,7 @@ class _Tally:
         The chunk's first `skip` windows are warm-up and only show in the curve.
         """
         cosines = self.comparison.cosines(pooled)
-        curve = torch.stack([_mean_over_patches(*each) for each in cosines], dim=-1)
+        curve = torch.stack([mean_over_patches(*each) for each in cosines], dim=-1)
         self.curves.append(curve.cpu())
         sums = [
             torch.stack([cosine * counts, counts])[:, skip:].sum(dim=1).cpu()

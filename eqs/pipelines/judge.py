@@ -17,7 +17,7 @@ from eqs.data import DSECFolder
 from eqs.events import EventReader
 from eqs.metrics import EventQualityScore, Judge, Reading, StreamScore
 from eqs.metrics.definition import choices
-from eqs.metrics.judge import RECORD
+from eqs.metrics.judge_folder import RECORD
 from eqs.metrics.scoring import Watcher
 from eqs.pipelines.build import Dataset
 from eqs.pipelines.runs import Run, finished_runs, recipe_hash
