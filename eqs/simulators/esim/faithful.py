@@ -14,8 +14,9 @@ from eqs.simulators.pixel.crossing import (
     crossing_share,
     officially_crossed,
 )
+from eqs.simulators.pixel.photoreceptor import Seen
 from eqs.simulators.pixel.randomness import draw_key, normal, word_at
-from eqs.simulators.pixel.thresholds import SMALLEST_THRESHOLD_LOG
+from eqs.simulators.pixel.thresholds import SMALLEST_THRESHOLD_LOG, ThresholdLaw
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
 
@@ -26,42 +27,39 @@ class FaithfulESIMPixels(ESIMPixels):
     def _fire(self, codes: NDArray[Any], signal: NDArray[Any], interval: Interval) -> Fired:
         model = self.model
         return _fire_official(
-            self.codes,
-            self.signal,
-            codes,
-            signal,
+            Seen(self.codes, self.signal),
+            Seen(codes, signal),
             self.reference,
             self.last_us,
-            (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
+            ThresholdLaw(
+                model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log
+            ),
             draw_key(model.seed, "threshold jitter", self.sequence, str(interval.frame)),
             float(model.refractory_us),
             model.shares_first_buffer and interval.frame == 1,
-            interval.start_us,
-            interval.span_us,
+            interval,
             self.keys,
         )
 
 
 @njit(cache=True, nogil=True)
 def _fire_official(
-    old_codes: NDArray[Any],
-    old_signal: NDArray[Any],
-    codes: NDArray[Any],
-    signal: NDArray[Any],
+    start: Seen,
+    end: Seen,
     reference: NDArray[np.float64],
     last_us: NDArray[np.float64],
-    thresholds: tuple[float, float, float],
+    law: ThresholdLaw,
     frame_key: np.uint64,
     refractory_us: float,
     shared_buffer: bool,
-    start_us: int,
-    span_us: int,
+    interval: Interval,
     keys: NDArray[np.int64],
 ) -> Fired:
-    on, off, sigma = thresholds
+    on, off, sigma = law
+    start_us, span_us = interval.start_us, interval.stop_us - interval.start_us
     count = 0
-    for pixel in range(codes.size):
-        first, last = old_signal[old_codes[pixel]], signal[codes[pixel]]
+    for pixel in range(end.codes.size):
+        first, last = start.signal[start.codes[pixel]], end.signal[end.codes[pixel]]
         if abs(last - first) <= SMALLEST_CHANGE_LOG:
             continue
         sign = 1 if last >= first else -1

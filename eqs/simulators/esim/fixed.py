@@ -14,7 +14,8 @@ from eqs.simulators.pixel.crossing import (
     crossing_share,
     firing_pixels,
 )
-from eqs.simulators.pixel.thresholds import threshold_map
+from eqs.simulators.pixel.photoreceptor import Seen
+from eqs.simulators.pixel.thresholds import Sides, threshold_map
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
 
@@ -53,15 +54,13 @@ class ESIMPixels:
         count = _fire_robust(
             self.chosen[:chosen],
             self.passed,
-            (self.codes, self.signal),
-            (codes, signal),
+            Seen(self.codes, self.signal),
+            Seen(codes, signal),
             self.reference,
             self.last_us,
-            self.on,
-            self.off,
+            Sides(self.on, self.off),
             float(self.model.refractory_us),
-            interval.start_us,
-            interval.span_us,
+            interval,
             keys,
         )
         return keys, count
@@ -82,24 +81,23 @@ def _difference(
 def _fire_robust(
     chosen: NDArray[np.int32],
     passed: NDArray[np.int64],
-    start: tuple[NDArray[Any], NDArray[np.float64]],
-    end: tuple[NDArray[Any], NDArray[np.float64]],
+    start: Seen,
+    end: Seen,
     reference: NDArray[np.float64],
     last_us: NDArray[np.float64],
-    on: NDArray[np.float64],
-    off: NDArray[np.float64],
+    thresholds: Sides,
     refractory_us: float,
-    start_us: int,
-    span_us: int,
+    interval: Interval,
     keys: NDArray[np.int64],
 ) -> int:
+    start_us, span_us = interval.start_us, interval.stop_us - interval.start_us
     count = 0
     for index in range(chosen.size):
         pixel, levels = chosen[index], passed[index]
-        first, last = start[1][start[0][pixel]], end[1][end[0][pixel]]
+        first, last = start.signal[start.codes[pixel]], end.signal[end.codes[pixel]]
         polarity = 1 if levels > 0 else 0
         # Both are read, as choosing between two numbers costs no branch.
-        up, down, held = on[pixel], -off[pixel], reference[pixel]
+        up, down, held = thresholds.on[pixel], -thresholds.off[pixel], reference[pixel]
         step = up if levels > 0 else down
         for ordinal in range(1, abs(levels) + 1):
             level = held + ordinal * step

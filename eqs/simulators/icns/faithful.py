@@ -10,11 +10,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.icns.latency import SEEING, latency
+from eqs.simulators.icns.latency import SEEING, Delays, latency
 from eqs.simulators.icns.parameters import ICNS
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
 from eqs.simulators.pixel.randomness import draw_key, uniform_map, word_at
-from eqs.simulators.pixel.thresholds import redraw, threshold_map
+from eqs.simulators.pixel.thresholds import Sides, ThresholdLaw, redraw, threshold_map
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
 
@@ -69,9 +69,11 @@ class FaithfulICNSPixels:
             self.reset,
             self.tau_us,
             self.ready_us,
-            (self.on, self.off),
-            (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
-            (float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
+            Sides(self.on, self.off),
+            ThresholdLaw(
+                model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log
+            ),
+            Delays(float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
             (self.on_us, self.off_us),
             (self.on_period_us, self.off_period_us),
             draw_key(model.seed, "events", self.sequence, str(interval.frame)),
@@ -97,14 +99,14 @@ def _delay(
     target: float,
     tau_us: float,
     sigma_log: float,
-    delays: tuple[float, float, float],
+    delays: Delays,
     word: np.uint64,
 ) -> float:
     """Time from a voltage to the event at a level on its way to the target."""
     way = target - voltage
     rest = max(1.0 - (level - voltage) / way, _SMALLEST_REST)
     blur_us = abs(sigma_log * tau_us / way)
-    return latency(delays[0] - tau_us * math.log(rest), delays[1], blur_us, word)
+    return latency(delays.latency_us - tau_us * math.log(rest), delays.jitter_us, blur_us, word)
 
 
 @njit(cache=True, nogil=True)
@@ -116,9 +118,9 @@ def _fire(
     reset: NDArray[np.float64],
     tau_us: NDArray[np.float64],
     ready_us: NDArray[np.float64],
-    thresholds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    drawn: tuple[float, float, float],
-    delays: tuple[float, float, float],
+    thresholds: Sides,
+    law: ThresholdLaw,
+    delays: Delays,
     background_us: tuple[NDArray[np.float64], NDArray[np.float64]],
     periods_us: tuple[NDArray[np.float64], NDArray[np.float64]],
     frame_key: np.uint64,
@@ -159,15 +161,15 @@ def _fire(
             up = change > 0
             word = word_at(pixel_key, ordinal)
             crossed = reset[pixel] + (on[pixel] if up else -off[pixel])
-            wait_us = _delay(level, crossed, target, tau, drawn[2], delays, word_at(word, 0))
+            wait_us = _delay(level, crossed, target, tau, law.sigma_log, delays, word_at(word, 0))
             event_us = math.floor(now_us + math.floor(wait_us))
             keys = with_room(keys, count + 1)
             keys[count] = event_key(int(event_us), pixel, 1 if up else 0)
             count += 1
             ordinal += 1
-            side, mean = (on, drawn[0]) if up else (off, drawn[1])
-            redraw(side, pixel, mean, drawn[2], 0.0, word_at(word, 1))
-            ready_us[pixel] = event_us + delays[2]
+            side, mean = (on, law.on_log) if up else (off, law.off_log)
+            redraw(side, pixel, mean, law.sigma_log, 0.0, word_at(word, 1))
+            ready_us[pixel] = event_us + delays.refractory_us
             if ready_us[pixel] < stop_us:
                 level = _follow(level, target, (ready_us[pixel] - now_us) / tau)
                 now_us, reset[pixel], ready_us[pixel] = (

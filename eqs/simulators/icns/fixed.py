@@ -3,24 +3,43 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
-from eqs.simulators.icns.latency import SEEING, latency
+from eqs.simulators.icns.latency import SEEING, Delays, latency
 from eqs.simulators.icns.parameters import ICNS
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
 from eqs.simulators.pixel.ramp_response import first_crossing, response
 from eqs.simulators.pixel.randomness import draw_key, uniform, word_at
-from eqs.simulators.pixel.thresholds import SMALLEST_THRESHOLD_LOG, redraw, threshold_map
+from eqs.simulators.pixel.thresholds import (
+    SMALLEST_THRESHOLD_LOG,
+    Sides,
+    ThresholdLaw,
+    redraw,
+    threshold_map,
+)
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
 
-Seen = tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]
-"""Codes of an image, its signal for each code, and the inverse root of the light for each."""
+
+class SeenLight(NamedTuple):
+    """An image as pixels see it: by grey level the signal and the inverse root of the light."""
+
+    codes: NDArray[Any]
+    signal: NDArray[np.float64]
+    inverse_root: NDArray[np.float64]
+
+
+class Voltages(NamedTuple):
+    """The state of all pixels: voltage, that of the last reset, end of the refractory period."""
+
+    voltage: NDArray[np.float64]
+    reset: NDArray[np.float64]
+    ready_us: NDArray[np.float64]
 
 
 class ICNSPixels:
@@ -31,7 +50,7 @@ class ICNSPixels:
         self.model = model
         self.sequence = sequence
         self.seen = self._seen(image)
-        self.voltage = self.seen[1][image.codes]
+        self.voltage = self.seen.signal[image.codes]
         self.reset = self.voltage.copy()
         self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
         self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
@@ -43,9 +62,9 @@ class ICNSPixels:
         sigma, seed = self.model.threshold_sigma_log, self.model.seed
         return threshold_map(mean_log, sigma, seed, name, image).copy()
 
-    def _seen(self, image: GreyImage) -> Seen:
+    def _seen(self, image: GreyImage) -> SeenLight:
         signal = self.model.signal(image.levels)
-        return image.codes, signal, np.exp(-0.5 * signal)
+        return SeenLight(image.codes, signal, np.exp(-0.5 * signal))
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
         """Events of one interval."""
@@ -54,12 +73,14 @@ class ICNSPixels:
         self.keys, count = _fire(
             before,
             self.seen,
-            (self.voltage, self.reset, self.ready_us),
-            (self.on, self.off),
-            (model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log),
-            (float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
+            Voltages(self.voltage, self.reset, self.ready_us),
+            Sides(self.on, self.off),
+            ThresholdLaw(
+                model.threshold_on_log, model.threshold_off_log, model.threshold_sigma_log
+            ),
+            Delays(float(model.latency_us), float(model.jitter_us), float(model.refractory_us)),
             float(model.time_constant_us),
-            self.background,
+            Sides(*self.background),
             draw_key(
                 model.seed,
                 "events",
@@ -85,14 +106,14 @@ def _background_wait(word: np.uint64, rate_per_us: float, left_us: float) -> flo
 
 @njit(cache=True, nogil=True)
 def _fire(
-    start: Seen,
-    end: Seen,
-    state: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    thresholds: tuple[NDArray[np.float64], NDArray[np.float64]],
-    drawn: tuple[float, float, float],
-    delays: tuple[float, float, float],
+    start: SeenLight,
+    end: SeenLight,
+    state: Voltages,
+    thresholds: Sides,
+    law: ThresholdLaw,
+    delays: Delays,
     time_constant_us: float,
-    background_hz: tuple[NDArray[np.float64], NDArray[np.float64]],
+    background_hz: Sides,
     frame_key: np.uint64,
     start_us: float,
     stop_us: float,
@@ -102,13 +123,15 @@ def _fire(
     on, off = thresholds
     count = 0
     for pixel in range(voltage.size):
-        codes = start[0][pixel], end[0][pixel]
-        first, last = start[1][codes[0]], end[1][codes[1]]
+        codes = start.codes[pixel], end.codes[pixel]
+        first, last = start.signal[codes[0]], end.signal[codes[1]]
         slope = (last - first) / (stop_us - start_us)
-        tau_us = time_constant_us * 1000.0 * start[2][codes[0]] * end[2][codes[1]]
+        tau_us = (
+            time_constant_us * 1000.0 * start.inverse_root[codes[0]] * end.inverse_root[codes[1]]
+        )
         level, now_us = voltage[pixel], start_us
-        on_rate = background_hz[0][pixel] * MICROSECONDS
-        rate = on_rate + background_hz[1][pixel] * MICROSECONDS
+        on_rate = background_hz.on[pixel] * MICROSECONDS
+        rate = on_rate + background_hz.off[pixel] * MICROSECONDS
         pixel_key, ordinal = word_at(frame_key, pixel), 0
         while True:
             light = first + slope * (now_us - start_us)
@@ -132,10 +155,12 @@ def _fire(
                 now_us += crossed_us
                 light += slope * crossed_us
                 level = bounds[int(up)]
-                blur_us = drawn[2] * tau_us / max(abs(light - level), 1e-12)
-                event_us = now_us + latency(delays[0], delays[1], blur_us, word_at(word, 1))
-                side, mean = (on, drawn[0]) if up else (off, drawn[1])
-                redraw(side, pixel, mean, drawn[2], SMALLEST_THRESHOLD_LOG, word_at(word, 2))
+                blur_us = law.sigma_log * tau_us / max(abs(light - level), 1e-12)
+                event_us = now_us + latency(
+                    delays.latency_us, delays.jitter_us, blur_us, word_at(word, 1)
+                )
+                side, mean = (on, law.on_log) if up else (off, law.off_log)
+                redraw(side, pixel, mean, law.sigma_log, SMALLEST_THRESHOLD_LOG, word_at(word, 2))
             elif now_us + wait_us < stop_us:
                 level = response(level, light, slope, tau_us, wait_us)
                 now_us += wait_us
@@ -146,7 +171,7 @@ def _fire(
             keys = with_room(keys, count + 1)
             keys[count] = event_key(int(event_us), pixel, 1 if up else 0)
             count += 1
-            ready_us[pixel] = event_us + delays[2]
+            ready_us[pixel] = event_us + delays.refractory_us
         light = first + slope * (now_us - start_us)
         voltage[pixel] = response(level, light, slope, tau_us, stop_us - now_us)
     return keys, count

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -11,6 +12,16 @@ from eqs.simulators.pixel.randomness import normal
 
 LONGEST_LATENCY_US = 10_000.0
 SEEING = -math.inf
+
+
+class Delays(NamedTuple):
+    """What lies between a crossing and its event, and how long the pixel then fires nothing."""
+
+    latency_us: float
+    jitter_us: float
+    refractory_us: float
+
+
 """The end of the refractory period of a pixel that is in none."""
 
 

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 MICROSECONDS = 1e-6
+
+
+class Seen(NamedTuple):
+    """An image as pixels see it: the signal of each grey level that occurs, and who has which."""
+
+    codes: NDArray[Any]
+    signal: NDArray[Any]
 
 
 def log_intensity(levels: NDArray[Any], offset: float) -> NDArray[Any]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -10,6 +12,21 @@ from eqs.frames import GreyImage
 from eqs.simulators.pixel.randomness import draw_key, normal, normal_map
 
 SMALLEST_THRESHOLD_LOG = 0.01
+
+
+class Sides(NamedTuple):
+    """Something that every pixel has once for ON and once for OFF, shape (pixels,) each."""
+
+    on: NDArray[np.float64]
+    off: NDArray[np.float64]
+
+
+class ThresholdLaw(NamedTuple):
+    """What thresholds are drawn from anew: their means, OFF as a positive number, and spread."""
+
+    on_log: float
+    off_log: float
+    sigma_log: float
 
 
 def threshold_map(
