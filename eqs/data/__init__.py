@@ -4,7 +4,7 @@ from eqs.data.dsec import DSECFolder, RecordingFolder, parse_size
 from eqs.data.labels import LabelProtocol, detector_rows
 from eqs.data.recording import Recording
 from eqs.data.simulated import EventSource, RecordedEvents, SimulatedEvents
-from eqs.data.windows import detection_windows, overlap_us, score_windows
+from eqs.data.windows import detection_windows, overlap_us
 
 __all__ = [
     "DSECFolder",
@@ -18,5 +18,4 @@ __all__ = [
     "detector_rows",
     "overlap_us",
     "parse_size",
-    "score_windows",
 ]

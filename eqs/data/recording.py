@@ -99,11 +99,6 @@ class Recording:
         return self.folder / FRAMES
 
     @property
-    def has_events(self) -> bool:
-        """Whether the sensor's own events are there."""
-        return self.events_path.exists()
-
-    @property
     def has_frames(self) -> bool:
         """Whether there are frames to simulate from."""
         return len(self.frame_paths) > 0

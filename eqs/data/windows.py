@@ -26,20 +26,6 @@ def detection_windows(
     return np.stack([stops - window_us, stops], axis=1)
 
 
-def score_windows(start_us: int, stop_us: int, window_us: int = 50_000) -> NDArray[np.int64]:
-    """Consecutive full windows of a stretch of time; a shorter remainder is left out.
-
-    Returns:
-        Start and stop of each window, int64, shape (windows, 2).
-
-    Example:
-        >>> score_windows(10, 135, 50).tolist()
-        [[10, 60], [60, 110]]
-    """
-    starts = start_us + window_us * np.arange(max(stop_us - start_us, 0) // window_us)
-    return np.stack([starts, starts + window_us], axis=1).astype(np.int64)
-
-
 def overlap_us(
     frame_times_us: NDArray[np.int64], events_start_us: int, events_stop_us: int
 ) -> tuple[int, int]:

@@ -67,6 +67,15 @@ def test_stored_windows_agree(tmp_path):
 
 
 @pytest.mark.parametrize("plain", [True, False])
-def test_a_training_step_runs(plain):
-    job = Job("training", plain=plain, size=(64, 96), steps=2, batch=1)
-    training(job)()
+def test_a_training_step_reaches_every_parameter(plain, monkeypatch):
+    made = []
+
+    def remembered(*arguments, **options):
+        made.append(RVTDetector(*arguments, **options))
+        return made[-1]
+
+    monkeypatch.setattr("benchmarks.rvt.RVTDetector", remembered)
+    training(Job("training", plain=plain, size=(64, 96), steps=2, batch=1))()
+    (detector,) = made
+    assert [name for name, each in detector.named_parameters() if each.grad is None] == []
+    assert all(each.grad.isfinite().all() for each in detector.parameters())

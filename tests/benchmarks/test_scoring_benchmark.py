@@ -1,14 +1,38 @@
 """The lines of the table are the same work, or their ratio means nothing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
 from benchmarks.scoring import SET_UP, Job, histograms, pair
 
+from eqs.metrics import Judge
+
+
+class Counted:
+    """A judge's network that remembers how many windows of how many streams it has seen."""
+
+    def __init__(self, network):
+        self.network, self.seen = network, []
+
+    def __getattr__(self, name):
+        return getattr(self.network, name)
+
+    def taps(self, x, *arguments, **options):
+        self.seen.append(x.shape[0] * x.shape[1])
+        return self.network.taps(x, *arguments, **options)
+
 
 @pytest.mark.parametrize("what", SET_UP)
-def test_every_line_runs(what):
-    SET_UP[what](Job(what, (32, 48), 3))()
+def test_every_line_sends_both_streams_through_the_network_once(what, monkeypatch):
+    network = Counted(Judge.random().backbone)
+    monkeypatch.setattr(Judge, "random", lambda: SimpleNamespace(backbone=network))
+    run = SET_UP[what](Job(what, (32, 48), 3))
+    for _ in range(2):
+        network.seen.clear()
+        run()
+        assert sum(network.seen) == 2 * 3
 
 
 def test_histograms_hold_the_events_of_the_windows():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from eqs.data import Recording, detection_windows, overlap_us, score_windows
+from eqs.data import Recording, detection_windows, overlap_us
 
 
 def test_reads_everything(tmp_path, make_recording):
@@ -18,7 +18,7 @@ def test_reads_everything(tmp_path, make_recording):
     assert [path.name for path in recording.frame_paths][:2] == ["000000.png", "000001.png"]
     assert recording.has_frames
     assert recording.has_labels
-    assert recording.has_events
+    assert recording.events_path.is_file()
     assert recording.tracks_at(1_050_000)["x"].tolist() == [5.0]
     assert len(recording.tracks_at(1_050_001)) == 0
 
@@ -190,15 +190,6 @@ def test_windows_end_at_frames():
     np.testing.assert_array_equal(windows[:, 1], times[1:])
     assert set(np.diff(windows, axis=1).ravel()) == {50_000}
     assert detection_windows(times[:1]).shape == (0, 2)
-
-
-def test_score_windows_are_full_and_adjacent():
-    windows = score_windows(3, 3 + 10 * 50_000 - 1)
-    assert len(windows) == 9
-    assert windows[0, 0] == 3
-    np.testing.assert_array_equal(windows[1:, 0], windows[:-1, 1])
-    assert score_windows(5, 5).shape == (0, 2)
-    assert score_windows(5, 0).shape == (0, 2)
 
 
 def test_overlap_of_frames_and_events():

@@ -119,7 +119,13 @@ def test_tensor_baselines_by_hand():
 @pytest.mark.parametrize("name", ["blank", "poisson"])
 def test_values_are_never_silently_missing(events, name):
     made = damage.blank(events) if name == "blank" else damage.poisson(events)
-    assert all(np.isfinite(value) for value in scores(made, events).values())
+    found = scores(made, events)
+    assert found.keys() == scores(events, events).keys()
+    assert all(np.isfinite(value) for value in found.values())
+    if name == "blank":
+        assert found["raw_cosine"] == 0
+    else:  # as many events, evenly spread as those are
+        assert found["log_rate_error"] < 0.05
 
 
 def test_other_sensors_are_refused(events):

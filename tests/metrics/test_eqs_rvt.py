@@ -115,6 +115,7 @@ def test_autocast_outside_does_not_reach_the_score(judge, readings):
     (plain,) = score_streams(judge, a, [b], readings[:3])
     with torch.autocast("cpu", dtype=torch.bfloat16):
         (cast,) = score_streams(judge, a, [b], readings[:3])
+    assert cast.keys() == plain.keys() == {each.name for each in readings[:3]}
     assert all(cast[name].score == plain[name].score for name in plain)
 
 

@@ -89,8 +89,12 @@ def test_features_that_do_not_vary_cannot_be_whitened():
 
 def test_silence_has_a_defined_gradient():
     a, b = torch.zeros(3, 2, 2, requires_grad=True), torch.randn(3, 2, 2)
-    patch_cosine(a, b).sum().backward()
+    value = patch_cosine(a, b)
+    value.sum().backward()
+    assert value.abs().max() == 0
     assert torch.isfinite(a.grad).all()
+    across = a.grad - (a.grad * b).sum(0) / b.square().sum(0) * b
+    torch.testing.assert_close(across, torch.zeros_like(a))  # it points along b alone
 
 
 def test_gradient_agrees_with_finite_differences():

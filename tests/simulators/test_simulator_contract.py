@@ -181,6 +181,7 @@ def test_a_stream_can_be_saved_and_restored(simulator, walk):
 @pytest.mark.parametrize("simulator", SIMULATORS, ids=label)
 def test_the_order_is_time_row_column(simulator, walk):
     events = simulator.simulate(*walk)
+    assert len(events) > 100
     key = (events.t * 16 + events.y) * 16 + events.x
     assert (np.diff(key) >= 0).all()
 

@@ -3,6 +3,7 @@
 from functools import partial
 from types import SimpleNamespace
 
+import pytest
 import torch
 from lightning.pytorch.loggers import CSVLogger, TensorBoardLogger
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
@@ -49,6 +50,14 @@ def test_frames_of_the_first_recording_are_logged(tmp_path):
     board.experiment.close()
 
 
-def test_without_a_board_nothing_is_drawn():
-    trainer = SimpleNamespace(loggers=[], is_global_zero=True)
+@pytest.mark.parametrize("first", [True, False])
+def test_without_a_board_nothing_is_drawn(tmp_path, monkeypatch, first):
+    def fail(*_):
+        raise AssertionError("drawn")
+
+    monkeypatch.setattr(DetectionPictures, "_drawn", fail)
+    board = TensorBoardLogger(tmp_path)
+    loggers = [CSVLogger(tmp_path)] if first else [board]  # no board, or not the first process
+    trainer = SimpleNamespace(loggers=loggers, is_global_zero=first)
     DetectionPictures().on_validation_epoch_end(trainer, SimpleNamespace())
+    assert not list(tmp_path.rglob("events.*"))
