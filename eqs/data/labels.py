@@ -114,7 +114,8 @@ class LabelProtocol:
         sides = boxes[:, 2:] - boxes[:, :2]
         scale = 1.0 if self.reference_width is None else width / self.reference_width
         large = np.all(sides >= self.min_side_px * scale, axis=1)
-        return large & (np.hypot(*sides.T) >= self.min_diagonal_px * scale)
+        enough: NDArray[np.bool_] = large & (np.hypot(*sides.T) >= self.min_diagonal_px * scale)
+        return enough
 
     def card(self) -> dict[str, Any]:
         """Everything that decides which boxes count, for storing beside a number."""

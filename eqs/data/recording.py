@@ -190,7 +190,7 @@ def _tracks(folder: Path, frame_times_us: NDArray[np.int64]) -> NDArray[np.void]
     if not path.exists():
         return None
     try:
-        tracks = np.load(path, allow_pickle=False)
+        tracks: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise ValueError(
             f"Expected a label array in {path}, got: {error}; replace the damaged file"

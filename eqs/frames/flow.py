@@ -107,7 +107,8 @@ def moved(image: Frame, flow: Flow) -> Frame:
 def agreement(there: Flow, back: Flow) -> NDArray[np.float32]:
     """How well each pixel comes back when it follows one flow and then the other, in (0, 1]."""
     miss = np.linalg.norm(there + moved(back, there), axis=-1) / TRUSTED_PX
-    return np.maximum(np.exp(-(miss**2)), LEAST_TRUST).astype(np.float32)
+    trust: Flow = np.maximum(np.exp(-(miss**2)), LEAST_TRUST).astype(np.float32)
+    return trust
 
 
 def frame_at(

@@ -126,7 +126,8 @@ class CachedInterpolation:
             digest.update(np.ascontiguousarray(frame).tobytes())
         path = Path(self.folder) / f"{digest.hexdigest()}.npy"
         if path.is_file():
-            return np.load(path)
+            kept: Frame = np.load(path)
+            return kept
         frames = self.inner.between(first, second)
         path.parent.mkdir(parents=True, exist_ok=True)
         # Several processes may make the same frames; each writes its own file and renames it.

@@ -205,7 +205,8 @@ def _precision(
     evaluation.params.maxDets = [1, 10, max_detections]
     evaluation.evaluate()
     evaluation.accumulate()
-    return evaluation.eval["precision"][..., -1]
+    precision: NDArray[np.float64] = evaluation.eval["precision"][..., -1]
+    return precision
 
 
 def _dataset(frames: Sequence[NDArray[np.float32]], classes: Sequence[int]) -> COCO:

@@ -100,7 +100,8 @@ def whitening_matrix(covariance: Tensor, shrinkage: float = 0.1) -> Tensor:
         )
     unit = torch.eye(len(exact), dtype=exact.dtype, device=exact.device)
     factor = torch.linalg.cholesky((1 - shrinkage) * exact + shrinkage * variance * unit)
-    return torch.linalg.solve_triangular(factor, unit, upper=False)
+    inverse: Tensor = torch.linalg.solve_triangular(factor, unit, upper=False)
+    return inverse
 
 
 def mean_over_stages(stages: Sequence[Tensor]) -> Tensor:

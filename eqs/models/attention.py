@@ -102,4 +102,5 @@ class PartitionAttention(nn.Module):
         branch = self.self_attn(tokens, self.ls1).view(grouped.shape)
         # Scattering the branch back over the map happens inside the residual sum.
         x = (spread + branch.permute(FROM_GROUPS[self.kind])).view(x.shape)
-        return x + self.mlp(self.norm2(x), self.ls2)
+        transformed: Tensor = x + self.mlp(self.norm2(x), self.ls2)
+        return transformed

@@ -112,7 +112,8 @@ class Stage(nn.Module):
     def tap(self, name: str, trace: Trace, state: State | None) -> Tensor:
         """One named quantity of a run, (T, N, h, w, C)."""
         if name in Trace._fields:
-            return getattr(trace, name)
+            traced: Tensor = getattr(trace, name)
+            return traced
         logits = self.lstm.gates(trace.attention, trace.hidden, None if state is None else state[0])
         if name == "gate_logits":
             return logits[2]

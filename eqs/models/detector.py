@@ -195,7 +195,10 @@ class RVTDetector(nn.Module):
             return detection_loss(boxes, raw[..., 4:], anchors, labels.float(), offsets)
 
     def _head(self, features: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
-        return self.yolox_head(self.fpn(features[-3:]))
+        raw: Tensor
+        anchors: Tensor
+        raw, anchors = self.yolox_head(self.fpn(features[-3:]))
+        return raw, anchors
 
 
 def size_of_width(embed_dim: int, path: str | Path) -> str:

@@ -26,7 +26,7 @@ class SmallGroupAttention(torch.autograd.Function):
         scores = query.bmm(key.transpose(1, 2)).to(exact).mul_(qkv.shape[-1] ** -0.5)
         scores = scores.sub_(scores.amax(-1, keepdim=True)).exp_()
         weights = scores.div_(scores.sum(-1, keepdim=True)).to(qkv.dtype)
-        mixed = weights.bmm(value)
+        mixed: Tensor = weights.bmm(value)
         ctx.save_for_backward(qkv, weights, mixed)
         return mixed
 
@@ -64,7 +64,7 @@ def attend(qkv: Tensor, num_heads: int) -> Tensor:
     if qkv.device.type == "cpu" and tokens <= SMALL_GROUP.get(qkv.dtype, 0):
         by_head = split.permute(3, 0, 2, 1, 4).reshape(3, groups * num_heads, tokens, -1)
         with torch.autocast("cpu", enabled=False):
-            mixed = SmallGroupAttention.apply(by_head)
+            mixed: Tensor = SmallGroupAttention.apply(by_head)  # type: ignore[no-untyped-call]
         mixed = mixed.view(groups, num_heads, tokens, -1)
     else:
         query, key, value = split.transpose(1, 2).unbind(3)

@@ -34,7 +34,8 @@ class Bottleneck(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Keep the shape."""
-        return self.conv2(self.conv1(x))
+        mapped: Tensor = self.conv2(self.conv1(x))
+        return mapped
 
 
 class CSPLayer(nn.Module):
@@ -51,7 +52,8 @@ class CSPLayer(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Map (B, in_channels, H, W) to (B, channels, H, W)."""
-        return self.conv3(torch.cat((self.m(self.conv1(x)), self.conv2(x)), dim=1))
+        mapped: Tensor = self.conv3(torch.cat((self.m(self.conv1(x)), self.conv2(x)), dim=1))
+        return mapped
 
 
 class PAFPN(nn.Module):

@@ -173,7 +173,9 @@ class ConvLSTM(nn.Module):
             hidden = state[0].to(dtype).reshape(pixels.shape[1:])
             cell = state[1].reshape(pixels.shape[1:])
         with torch.autocast(x.device.type, enabled=False):
-            hiddens, cells = LSTMSequence.apply(pixels, weight, bias, hidden, cell)
+            hiddens, cells = LSTMSequence.apply(  # type: ignore[no-untyped-call]
+                pixels, weight, bias, hidden, cell
+            )
         return hiddens.view(x.shape), cells.view(x.shape)
 
     def gates(self, x: Tensor, hiddens: Tensor, hidden: Tensor | None) -> tuple[Tensor, ...]:
@@ -191,4 +193,5 @@ class ConvLSTM(nn.Module):
             self.conv1x1.weight.flatten(1),
             self.conv1x1.bias,
         )
-        return logits.split(self.channels, dim=-1)
+        by_gate: tuple[Tensor, ...] = logits.split(self.channels, dim=-1)
+        return by_gate

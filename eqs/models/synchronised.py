@@ -36,7 +36,10 @@ class SumOverProcesses(torch.autograd.Function):
 
 def mean_over_processes(value: Tensor) -> Tensor:
     """The mean of every process's value; gradients flow back to all of them."""
-    return SumOverProcesses.apply(value) / processes() if processes() > 1 else value
+    if processes() > 1:
+        mean: Tensor = SumOverProcesses.apply(value) / processes()  # type: ignore[no-untyped-call]
+        return mean
+    return value
 
 
 class SyncBatchNorm(nn.BatchNorm2d):

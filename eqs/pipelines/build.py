@@ -38,6 +38,6 @@ def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:
 
 def dataset(cfg: DictConfig) -> Dataset:
     """The configured data set, generated or checked, ready to be read."""
-    built = instantiate(cfg.data)
+    built: Dataset = instantiate(cfg.data)
     built.prepare()
     return built

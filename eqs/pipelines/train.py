@@ -94,7 +94,9 @@ def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]
     model = instantiate(cfg.model)
     if cfg.compile:
         model.compile_stages()
-    return instantiate(cfg.task)(model=model, protocol=protocol, test_streams=test_streams)
+    build = instantiate(cfg.task)
+    task: DetectionTask = build(model=model, protocol=protocol, test_streams=test_streams)
+    return task
 
 
 def build_trainer(cfg: DictConfig, run: Run) -> lightning.Trainer:
@@ -115,7 +117,8 @@ def build_trainer(cfg: DictConfig, run: Run) -> lightning.Trainer:
     )
     callbacks: list[Callback] = [last, best, *instantiate(cfg.callbacks).values()]
     loggers = [logger(save_dir=run.folder) for logger in instantiate(cfg.logger).values()]
-    return instantiate(cfg.trainer, callbacks=callbacks, logger=loggers)
+    trainer: lightning.Trainer = instantiate(cfg.trainer, callbacks=callbacks, logger=loggers)
+    return trainer
 
 
 def checkpoint_path(cfg: DictConfig, run: Run) -> Path | None:

@@ -77,4 +77,5 @@ def _stretches(elapsed_us: NDArray[np.int64], span_us: int, bins: int) -> NDArra
     share = elapsed_us.astype(np.float32) / np.float32(span_us)
     share = np.clip(share, NEAR_ZERO, np.float32(1) - NEAR_ZERO)
     halvings = np.log(share) / np.log(np.float32(0.5))
-    return np.floor(np.maximum(bins - halvings, 0)).astype(np.int64)
+    stretches: NDArray[np.int64] = np.floor(np.maximum(bins - halvings, 0)).astype(np.int64)
+    return stretches

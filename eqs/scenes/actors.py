@@ -81,7 +81,9 @@ def _shadow(half_width: float, half_length: float) -> tuple[float, ...]:
     return _part(low, (*low[:4], 0.02), 0.7, mode=SHADOW)
 
 
-def _wheels(positions: tuple[float, ...], half_width: float, radius: float) -> list[tuple]:
+def _wheels(
+    positions: tuple[float, ...], half_width: float, radius: float
+) -> list[tuple[float, ...]]:
     rows = []
     for side, seen_from in ((half_width, RIGHT), (-half_width, LEFT)):
         for forward in positions:
@@ -94,7 +96,7 @@ def _wheels(positions: tuple[float, ...], half_width: float, radius: float) -> l
 
 def _lamps(
     forward: float, side: float, up: float, size: float, seen_from: int, emit: float, albedo: float
-) -> list[tuple]:
+) -> list[tuple[float, ...]]:
     half = (size, 0.01)
     return [
         _part(

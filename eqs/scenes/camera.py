@@ -24,7 +24,10 @@ def tone_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
         [0.0, 0.461, 1.0]
     """
     clipped = np.clip(linear, 0.0, 1.0).astype(np.float64)
-    return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1.0 / 2.4) - 0.055)
+    shown: NDArray[np.float64] = np.where(
+        clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1.0 / 2.4) - 0.055
+    )
+    return shown
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -269,7 +269,7 @@ class DSECMini:
 
     def _description(self) -> dict[str, Any]:
         """Everything the files depend on, as it reads back from JSON."""
-        return json.loads(
+        description: dict[str, Any] = json.loads(
             json.dumps(
                 {
                     "version": VERSION,
@@ -283,6 +283,7 @@ class DSECMini:
                 }
             )
         )
+        return description
 
     def _remove_others(self, root: Path) -> None:
         """Delete recordings of an earlier plan, which would otherwise join the splits."""

@@ -170,4 +170,5 @@ def ground(
     edge = -HALF_STREET_M + 0.95 * shading[None]
     sunny = (x * np.sign(lighting.sun_side)) > edge
     light = lighting.ambient_lux + lighting.sun_lux * sunny
-    return albedo * (light + lighting.lamp_lux * lamp_pools(texel_m, length)[None])
+    radiance: Map = albedo * (light + lighting.lamp_lux * lamp_pools(texel_m, length)[None])
+    return radiance

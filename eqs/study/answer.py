@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from eqs.names import REFERENCE
 from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.tables import (
     RATIO_FLOOR,
-    REFERENCE,
     simulated,
     summarise_eqs,
     summarise_study,

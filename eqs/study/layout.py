@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from eqs.names import BASELINE
+from eqs.names import BASELINE, REFERENCE
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.tables import (
     MAP_COLUMNS,
     RATIO_FLOOR,
-    REFERENCE,
     baseline_columns,
     score_columns,
     simulated,

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from eqs.names import REFERENCE
 from eqs.study.answer import answer
 from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.layout import (
@@ -25,7 +26,6 @@ from eqs.study.layout import (
 from eqs.study.printed import ACCURACY_TABLE, SCORES_TABLE
 from eqs.study.tables import (
     RATIO_FLOOR,
-    REFERENCE,
     baseline_columns,
     summarise_study,
     write_text,

@@ -139,7 +139,8 @@ def _weighted_spearman(weights: NDArray[Any], x: Vector, y: Vector) -> Vector:
 
 def _sample_ranks(weights: NDArray[Any], values: Vector) -> Vector:
     below = (values < values[:, None]) + 0.5 * (values == values[:, None])
-    return weights @ below.T
+    ranks: Vector = weights @ below.T
+    return ranks
 
 
 def _moments(weights: NDArray[Any], x: Vector, y: Vector) -> Vector:

@@ -140,7 +140,8 @@ class Augmentation:
 
 def visible(boxes: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Which boxes are still a pixel wide and high, shape (n,)."""
-    return np.all(boxes[:, 2:] - boxes[:, :2] >= SMALLEST_SIDE_PX, axis=1)
+    wide: NDArray[np.bool_] = np.all(boxes[:, 2:] - boxes[:, :2] >= SMALLEST_SIDE_PX, axis=1)
+    return wide
 
 
 def _corners_showing(
@@ -164,4 +165,5 @@ def _resized(frames: NDArray[np.uint8], height: int, width: int) -> NDArray[np.u
         (2 * np.arange(wanted) + 1) * given // (2 * wanted)
         for wanted, given in zip((height, width), frames.shape[-2:], strict=True)
     )
-    return frames.take(rows, axis=-2).take(columns, axis=-1)
+    resized: NDArray[np.uint8] = frames.take(rows, axis=-2).take(columns, axis=-1)
+    return resized

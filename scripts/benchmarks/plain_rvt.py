@@ -43,7 +43,8 @@ def attention_block(block: PartitionAttention, x: Tensor, partition: tuple[int, 
     branch = branch.view(grouped.shape).permute(FROM_GROUPS[block.kind]).reshape(x.shape)
     x = x + branch
     first, _, last = block.mlp.net
-    return x + block.ls2.gamma * last(first(block.norm2(x)))
+    transformed: Tensor = x + block.ls2.gamma * last(first(block.norm2(x)))
+    return transformed
 
 
 def recurrent_cell(lstm: ConvLSTM, x: Tensor, state: State | None) -> State:

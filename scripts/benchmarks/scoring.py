@@ -105,7 +105,7 @@ def events(job: Job) -> Callable[[], None]:
     return _scored(pair(job), stop_us=job.windows * 50_000)
 
 
-def _scored(streams: list, stop_us: int | None = None) -> Callable[[], None]:
+def _scored(streams: list[Events] | list[Tensor], stop_us: int | None = None) -> Callable[[], None]:
     backbone = Judge.random().backbone
     reading = Reading(definition=Definition(stages=STAGES))
     start_us = None if stop_us is None else 0

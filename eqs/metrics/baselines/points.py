@@ -72,4 +72,5 @@ def points(events: Events, start_us: int, window_us: int) -> NDArray[np.float64]
         inside.y[kept] / max(events.height - 1, 1),
         inside.p[kept].astype(np.float64),
     )
-    return np.stack(scaled, axis=1) * EXTENT
+    stacked: NDArray[np.float64] = np.stack(scaled, axis=1) * EXTENT
+    return stacked

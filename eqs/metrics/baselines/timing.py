@@ -28,7 +28,8 @@ def pixel_intervals(events: Events) -> NDArray[np.int64]:
     pixel = events.y.astype(np.int64) * events.width + events.x
     order = np.argsort(pixel, kind="stable")
     pixel, times = pixel[order], events.t[order]
-    return np.diff(times)[pixel[1:] == pixel[:-1]]
+    intervals: NDArray[np.int64] = np.diff(times)[pixel[1:] == pixel[:-1]]
+    return intervals
 
 
 def phase_locking_error(

@@ -67,7 +67,7 @@ class PixelFilter:
     def advance(self, image: GreyImage, span_us: int) -> NDArray[np.float64]:
         """The output after the interval that ends with an image."""
         model = self.model
-        target = model.signal(image.levels)[image.codes]
+        target: NDArray[np.float64] = model.signal(image.levels)[image.codes]
         if model.order == 0:
             self.input = self.output = target
             return target
