@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 import torch
+from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
-from omegaconf import OmegaConf
 
 from eqs.models import RVTDetector, reset_states
 
-CONFIGS = Path(__file__).parents[2] / "eqs/configs" / "model"
+CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 
 
 @torch.no_grad()
@@ -95,7 +95,8 @@ def test_unknown_sizes_and_counts_are_named():
 
 @pytest.mark.parametrize("size", ["tiny", "small", "base"])
 def test_configurations_build_their_size(size):
-    config = OmegaConf.load(CONFIGS / f"rvt_{size}.yaml")
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        config = compose(overrides=[f"+model=rvt_{size}"]).model
     # These come from other groups of the whole configuration.
     config.num_classes, config.partition_split_32, config.layer_scale_init = 3, 2, 0.1
     config.in_channels, config.open_recurrence, config.first_box_strides = 20, True, [2.0, 3.0]
