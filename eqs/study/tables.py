@@ -253,7 +253,7 @@ def read_table(path: Path | str) -> pd.DataFrame:
         )
     header = pd.read_csv(path, nrows=0).columns
     text = {name: str for name in header if name in TEXT_COLUMNS or name.endswith("_hash")}
-    table = pd.read_csv(path, dtype=text, float_precision="round_trip")
+    table = pd.read_csv(path, dtype=text)
     return table.astype({name: "Int64" for name in COUNT_COLUMNS if name in table})
 
 
