@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import cast
 
 import torch
@@ -73,11 +72,14 @@ def _branch(width: int) -> nn.Sequential:
     return nn.Sequential(ConvNormAct(width, width, 3), ConvNormAct(width, width, 3))
 
 
-@lru_cache(maxsize=32)
 def anchor_grid(
     shapes: tuple[tuple[int, int], ...], strides: tuple[int, ...], device: torch.device
 ) -> Tensor:
-    """Anchors (A, 3) of levels of these (height, width): grid column, grid row, stride."""
+    """Anchors (A, 3) of levels of these (height, width): grid column, grid row, stride.
+
+    They are made for every call: one that is kept from `torch.inference_mode` cannot be trained
+    with afterwards.
+    """
     levels = []
     for (height, width), stride in zip(shapes, strides, strict=True):
         rows = torch.arange(height, device=device).repeat_interleave(width)

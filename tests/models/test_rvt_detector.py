@@ -135,3 +135,14 @@ def test_compiled_stages_are_the_same_function():
         found[compiled] = maps[-1].detach(), weight.grad.clone()
     torch.testing.assert_close(found[True], found[False], rtol=1e-4, atol=1e-5)
     assert list(model.state_dict()) == names
+
+
+def test_a_detector_that_has_looked_can_still_learn():
+    model = RVTDetector("tiny", partition_split_32=1, num_classes=3)
+    x, labels = frames()
+    with torch.inference_mode():
+        maps, _ = model.backbone.forward_sequence(x.float())
+        model.detect([level.flatten(0, 1) for level in maps])
+    maps, _ = model.backbone.forward_sequence(x.float())
+    model.loss([level.flatten(0, 1) for level in maps], labels)["loss"].backward()
+    assert all(parameter.grad is not None for parameter in model.yolox_head.parameters())
