@@ -89,7 +89,7 @@ class EventDataModule(lightning.LightningDataModule):
         source: the events to train and validate on.
         tests: the events of each test stream, by its name; the order is that of the loaders.
         seed: what all draws depend on.
-        batch_size: samples per batch and process.
+        batch_size: samples per batch, over all processes.
         sequence_length: windows per sample.
         steps_per_epoch: training steps between two ends of an epoch.
         epochs: number of epochs.

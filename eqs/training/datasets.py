@@ -168,7 +168,7 @@ class TrainingDataset(Dataset[Batch]):
         sources: the recordings, of one size.
         seed: what all draws depend on.
         steps: number of steps.
-        batch_size: samples per batch and process.
+        batch_size: samples per batch, over all processes.
         sequence_length: windows per sample, T.
         stream_share: share of the samples that play whole recordings; the others are random.
         augmentation: random changes; none if None.
@@ -215,7 +215,7 @@ class TrainingDataset(Dataset[Batch]):
     def __getitem__(self, step: int) -> Batch:
         """The batch of one step."""
         schedule = self.schedule
-        chunks = [schedule.chunk(step, position) for position in range(schedule.batch_size)]
+        chunks = [schedule.chunk(step, position) for position in range(schedule.slots)]
         batch = collate([self._sample(chunk) for chunk in chunks], schedule.sequence_length)
         batch["first"] = torch.tensor([chunk.first for chunk in chunks])
         batch["stream"] = torch.tensor([chunk.stream for chunk in chunks])

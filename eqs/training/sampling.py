@@ -59,7 +59,7 @@ class Schedule:
     Args:
         seed: what all draws depend on.
         window_counts: number of windows of each recording.
-        batch_size: slots per process.
+        batch_size: slots of all processes together, so that their number changes nothing.
         sequence_length: windows per sample.
         stream_share: share of stream slots, rounded up to whole slots.
         ends: for each recording the windows at which random samples may end, those with labels;
@@ -93,6 +93,11 @@ class Schedule:
                 f"got {self.batch_size}, {self.sequence_length} and {self.seed}; "
                 "set recipe.batch_size, recipe.sequence_length and seed"
             )
+        if self.batch_size % self.world_size:
+            raise ValueError(
+                f"Expected a batch that {self.world_size} processes can share, got "
+                f"{self.batch_size} samples; set recipe.batch_size or trainer.devices"
+            )
         if not self.window_counts or min(self.window_counts) < 1:
             raise ValueError(
                 f"Expected recordings of at least one window, got {self.window_counts}; "
@@ -105,14 +110,19 @@ class Schedule:
             )
 
     @property
+    def slots(self) -> int:
+        """Slots of this process."""
+        return self.batch_size // self.world_size
+
+    @property
     def stream_slots(self) -> int:
-        """Slots of a batch that play whole recordings; the others are random ones."""
+        """Slots of the whole batch that play whole recordings; the others are random ones."""
         return math.ceil(self.stream_share * self.batch_size - 1e-9)  # 0.7 * 10 exceeds 7
 
     def chunk(self, step: int, position: int) -> Chunk:
         """The windows of one slot of this process's batch at one step."""
-        slot = self.rank * self.batch_size + position
-        if position < self.stream_slots:
+        slot = self.rank * self.slots + position
+        if slot < self.stream_slots:
             return self._stream_chunk(step, slot)
         return self._random_chunk(step, slot)
 

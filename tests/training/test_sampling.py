@@ -100,10 +100,11 @@ def test_depends_on_seed_step_and_slot_only():
     assert [schedule(seed=4).chunk(step, 1) for step in range(40)] != forwards
 
 
-def test_processes_have_slots_of_their_own():
-    whole = schedule(stream_share=1, batch_size=6, window_counts=(5,) * 9)
+@pytest.mark.parametrize("share", [0, 0.3, 1])
+def test_processes_share_the_slots_that_one_would_have(share):
+    whole = schedule(stream_share=share, batch_size=6, window_counts=(5,) * 9)
     ranks = [
-        schedule(stream_share=1, batch_size=3, window_counts=(5,) * 9, rank=rank, world_size=2)
+        schedule(stream_share=share, batch_size=6, window_counts=(5,) * 9, rank=rank, world_size=2)
         for rank in range(2)
     ]
     for step in range(10):
@@ -127,6 +128,7 @@ def test_keys_do_not_collide():
     [
         ({"stream_share": 1.5}, r"share of streams in \[0, 1\], got 1.5; set recipe\.stream"),
         ({"batch_size": 0}, r"set recipe\.batch_size"),
+        ({"world_size": 3}, r"set recipe\.batch_size or trainer\.devices"),
         ({"seed": -1}, "a seed of at least 0, got 4, 5 and -1"),
         ({"window_counts": (3, 0)}, "at least one window"),
         ({"window_counts": ()}, "at least one window"),
