@@ -1,22 +1,113 @@
-"""Small files: JSON records that are whole or not there, hashes, lists of whole numbers."""
+"""Files that are whole or not there, one writer at a time, hashes, lists of whole numbers."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import logging
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
+
+log = logging.getLogger(__name__)
+PARTIAL = ".partial"
+ABANDONED_S = 86_400  # nobody writes a day long without touching the file
+
+
+@contextmanager
+def complete_file(path: Path | str) -> Iterator[Path]:
+    """Give a file its name only when it is complete, whoever else writes it at the same time.
+
+    What the block writes to the path it is given is on the disk before it takes the name; after an
+    exception nothing is left. Every writer has a temporary name of its own, so two of the same file
+    do not meet, whether the file system knows locks or not.
+
+    Args:
+        path: the file's name; its folder is made if need be.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     with complete_file(Path(folder) / "note.txt") as partial:
+        ...         _ = partial.write_text("all of it")
+        ...     [file.name for file in Path(folder).iterdir()]
+        ['note.txt']
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _remove_abandoned(path)
+    partial = path.with_name(f"{path.name}.{uuid4().hex}{PARTIAL}")
+    try:
+        yield partial
+        with partial.open("rb+") as file:
+            os.fsync(file.fileno())
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _remove_abandoned(path: Path) -> None:
+    """Remove what writers of this file that were killed long ago have left."""
+    for other in path.parent.glob(f"{glob_escaped(path.name)}.*{PARTIAL}"):
+        try:
+            if other.is_file() and time.time() - other.stat().st_mtime > ABANDONED_S:
+                other.unlink()
+        except OSError:  # another process removes it, or it is not ours to remove
+            continue
+
+
+def glob_escaped(name: str) -> str:
+    """A name as a pattern that finds itself alone."""
+    return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
+
+
+@contextmanager
+def one_at_a_time(path: Path | str, work: str) -> Iterator[None]:
+    """Let one process at a time do some work; the others wait and then find it done.
+
+    Where the file system has no locks all of them work; the files they write are whole all the
+    same.
+
+    Args:
+        path: what is worked on; the lock is a hidden file beside it.
+        work: what is done, for those who wait.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(path.with_name(f".{path.name}.lock"))
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        log.info("another process is %s; waiting for it", work)
+        lock.acquire()
+    except (NotImplementedError, OSError) as error:
+        if isinstance(error, PermissionError):
+            raise
+        log.debug("no locks at %s: %s", path, error)
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def write_text(text: str, path: Path) -> Path:
+    """Write text under its name only when it is complete."""
+    with complete_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+    return path
 
 
 def write_json(path: Path, content: object) -> None:
     """Write a record under its name only when it is complete."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(json.dumps(content, indent=2) + "\n")
-    partial.replace(path)
+    write_text(json.dumps(content, indent=2) + "\n", path)
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -102,3 +102,11 @@ def make_tracks():
 def make_recording():
     """`write_recording` as a fixture."""
     return write_recording
+
+
+@pytest.fixture(autouse=True, scope="session")
+def own_cache(tmp_path_factory):
+    """Tests remember hashes in a place of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield

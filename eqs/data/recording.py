@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from eqs.files import whole_numbers
+from eqs.content import content_hash, content_hashes
+from eqs.files import short_hash, whole_numbers
 from eqs.frames import read_image
 
 EVENTS = Path("events/left/events.h5")
@@ -102,6 +103,16 @@ class Recording:
     def has_frames(self) -> bool:
         """Whether there are frames to simulate from."""
         return len(self.frame_paths) > 0
+
+    def frames_hash(self) -> str:
+        """What a simulator is fed with: the content of the frames, and their times."""
+        return short_hash([self.frame_times_us.tolist(), content_hashes(self.frame_paths)])
+
+    def content_hash(self) -> str:
+        """Everything that a training, a score or a test takes from this recording, by content."""
+        files = (self.events_path, self.folder / TRACKS)
+        held = [content_hash(file) if file.is_file() else None for file in files]
+        return short_hash([self.name, self.frames_hash(), *held])
 
     @property
     def has_labels(self) -> bool:

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import logging
-import multiprocessing
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
+from eqs.content import content_hash
 from eqs.data.recording import Recording
 from eqs.events.writer import EventWriter
-from eqs.files import file_sha256, read_json, short_hash, write_json
+from eqs.files import one_at_a_time, read_json, short_hash, write_json
 from eqs.frames import FrameFolder
-from eqs.processors import available_cores, share_cores
+from eqs.processors import available_cores, side_by_side
 from eqs.simulators import Simulator
-
-log = logging.getLogger(__name__)
 
 
 class EventSource(Protocol):
@@ -62,8 +58,9 @@ class RecordedEvents:
 class SimulatedEvents:
     """Events simulated from a recording's frames, written once and reused.
 
-    A stream is reused only while the simulator's parameters and version and the frames are the
-    same; anything else makes a new stream in a folder of its own.
+    A stream is reused only while the simulator's parameters and version, what the frames hold,
+    their times and the file itself are the same. Other parameters make a stream in a folder of its
+    own; other frames replace it.
 
     Args:
         simulator: the simulator with its parameters.
@@ -96,24 +93,20 @@ class SimulatedEvents:
         Raises:
             ValueError: a recording has no frames.
         """
-        missing = [recording for recording in recordings if not self._is_current(recording)]
-        if not missing:
-            return
-        blind = [recording for recording in missing if not recording.has_frames]
+        blind = [recording for recording in recordings if not recording.has_frames]
         if blind:
             raise ValueError(
                 f"Expected frames to simulate from in {blind[0].frame_folder}, got none; "
                 "set data.root to recordings with frames, or sim=real"
             )
-        context = multiprocessing.get_context("spawn")
-        workers = min(self.workers, len(missing))
-        with ProcessPoolExecutor(
-            workers, mp_context=context, initializer=share_cores, initargs=(workers,)
-        ) as pool:
-            jobs = [pool.submit(self.simulate, recording) for recording in missing]
-            description = f"simulating {self.simulator.name}"
-            for job in track(as_completed(jobs), description=description, total=len(jobs)):
-                job.result()
+        if not self._missing(recordings):
+            return
+        description = f"simulating {self.simulator.name}"
+        with one_at_a_time(self.root / self.label, description):
+            missing = self._missing(recordings)  # fewer, if another process was at it
+            done = side_by_side(self.simulate, missing, min(self.workers, len(missing)) or 1)
+            for _ in track(done, description=description, total=len(missing)):
+                pass
 
     def simulate(self, recording: Recording) -> None:
         """Write one recording's events and the manifest that says what they are."""
@@ -127,8 +120,8 @@ class SimulatedEvents:
                 "parameters": self.simulator.parameters(),
                 "version": self.simulator.version,
                 "recording": recording.name,
-                "frames": frame_fingerprint(recording),
-                "frames_sha256": short_hash([file_sha256(file) for file in recording.frame_paths]),
+                "frames": recording.frames_hash(),
+                "file": content_hash(path),
                 "events": events,
             },
         )
@@ -139,17 +132,20 @@ class SimulatedEvents:
     def _manifest_path(self, recording: Recording) -> Path:
         return self._folder(recording) / "manifest.json"
 
+    def _missing(self, recordings: Sequence[Recording]) -> list[Recording]:
+        return [recording for recording in recordings if not self._is_current(recording)]
+
     def _is_current(self, recording: Recording) -> bool:
         manifest = self._manifest_path(recording)
         if not manifest.exists() or not self.path(recording).exists():
             return False
-        stored = read_json(manifest)
-        expected = (
-            self.simulator.parameters(),
-            self.simulator.version,
-            frame_fingerprint(recording),
-        )
-        return (stored["parameters"], stored["version"], stored["frames"]) == expected
+        expected = {
+            "parameters": self.simulator.parameters(),
+            "version": self.simulator.version,
+            "frames": recording.frames_hash(),
+            "file": content_hash(self.path(recording)),
+        }
+        return expected.items() <= read_json(manifest).items()
 
 
 def write_stream(
@@ -192,13 +188,3 @@ def write_stream(
         writer.append(rest)
         writer.span_us = stream.span_us
     return frames, count + len(rest)
-
-
-def frame_fingerprint(recording: Recording) -> str:
-    """Hash of the frames' times, names and sizes: cheap enough to ask before every use."""
-    return short_hash([recording.frame_times_us.tolist(), list(_sizes(recording.frame_paths))])
-
-
-def _sizes(paths: Iterable[Path]) -> Iterable[tuple[str, int]]:
-    for path in paths:
-        yield path.name, path.stat().st_size

@@ -14,6 +14,7 @@ from eqs.drawing.pictures import Boxes, above, box_colour, event_image
 from eqs.drawing.style import BRIGHTER, DARKER
 from eqs.events import EventReader, Events
 from eqs.extras import needed
+from eqs.files import complete_file
 
 Picture = NDArray[np.uint8]
 STILLS = 8  # in a strip
@@ -108,27 +109,21 @@ def write_film(
             f"more, got {path}, {len(pictures)} pictures and {zoom}"
         )
     large = [picture.repeat(zoom, axis=0).repeat(zoom, axis=1) for picture in pictures]
-    partial = path.with_name(f"{path.stem}.partial{path.suffix}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
+    with complete_file(path) as partial:
         writers[path.suffix](partial, large, frames_per_second)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _write_gif(path: Path, pictures: Sequence[Picture], frames_per_second: float) -> None:
     first, *rest = [Image.fromarray(picture) for picture in pictures]
-    first.save(
-        path, save_all=True, append_images=rest, duration=round(1000 / frames_per_second), loop=0
-    )
+    duration_ms = round(1000 / frames_per_second)
+    first.save(path, format="GIF", save_all=True, append_images=rest, duration=duration_ms, loop=0)
 
 
 def _write_mp4(path: Path, pictures: Sequence[Picture], frames_per_second: float) -> None:
     with needed("video", "to write an MP4 (a GIF needs none)"):
         import av
     height, width = pictures[0].shape[:2]
-    with av.open(str(path), "w") as container:
+    with av.open(str(path), "w", format="mp4") as container:
         stream = container.add_stream("h264", rate=max(1, round(frames_per_second)))
         stream.height, stream.width = height + height % 2, width + width % 2
         stream.pix_fmt = "yuv420p"
@@ -144,4 +139,4 @@ def _write_strip(path: Path, pictures: Sequence[Picture], _: float) -> None:
     row: list[Picture] = []
     for index in chosen:
         row += [pictures[index], gap]
-    Image.fromarray(np.concatenate(row[:-1], axis=1)).save(path)
+    Image.fromarray(np.concatenate(row[:-1], axis=1)).save(path, format="PNG")

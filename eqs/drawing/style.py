@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from eqs.files import complete_file
 from eqs.names import REFERENCE
 
 DARKER = "#d7301f"
@@ -60,17 +60,9 @@ def save_figure(drawing: Figure, folder: Path | str, name: str) -> Path:
         Path of the PNG.
     """
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     for kind in ("svg", "png"):
         path = folder / f"{name}.{kind}"
-        partial = folder / f"{path.name}.{os.getpid()}.partial"
         undated = {"Date": None} if kind == "svg" else {"Software": None}
-        try:
-            with mpl.rc_context(STYLE):
-                drawing.savefig(
-                    partial, format=kind, dpi=150, bbox_inches="tight", metadata=undated
-                )
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+        with complete_file(path) as partial, mpl.rc_context(STYLE):
+            drawing.savefig(partial, format=kind, dpi=150, bbox_inches="tight", metadata=undated)
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from eqs.events.reader import STORED_TYPES
 from eqs.events.stream import Events
+from eqs.files import complete_file
 
 # Windows of some ten thousand events read fastest from chunks of this length: larger chunks are
 # decompressed in vain, smaller ones cost a call each.
@@ -23,7 +25,7 @@ LONGEST_US = int(np.iinfo(np.uint32).max)
 class EventWriter:
     """Writes one event file, piece by piece; it gets its name only when it is complete.
 
-    Until then it is called `<name>.partial`, which an exception inside the `with` block removes.
+    Until then it has a temporary name, and an exception inside the `with` block removes it.
     The same events give the same file however they are cut into pieces.
 
     Args:
@@ -51,7 +53,6 @@ class EventWriter:
     ) -> None:
         """Remember the file's name; nothing is created yet."""
         self.path = Path(path)
-        self.partial_path = self.path.with_name(self.path.name + ".partial")
         self.height, self.width = height, width
         self.span_us: tuple[int, int] | None = None
         """Start and stop of the time that was watched, which may be set until the file is whole."""
@@ -64,8 +65,8 @@ class EventWriter:
 
     def __enter__(self) -> Self:
         """Begin the file under its temporary name."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = h5py.File(self.partial_path, "w")
+        self._naming = complete_file(self.path)
+        self._file = h5py.File(self._naming.__enter__(), "w")
         self._file.attrs.update(height=self.height, width=self.width)
         for name, dtype in STORED_TYPES.items():
             self._file.create_dataset(
@@ -86,19 +87,20 @@ class EventWriter:
         trace: TracebackType | None,
     ) -> None:
         """Complete the file and give it its name, or remove it after an exception."""
-        try:
-            if kind is None:
-                self._flush()
-                index = np.concatenate(self._index).astype(np.uint64)
-                self._file.create_dataset("ms_to_idx", data=index)
-                self._file.create_dataset("t_offset", data=np.int64(self._offset_us or 0))
-                if self.span_us is not None:
-                    self._file.attrs.update(start_us=self.span_us[0], stop_us=self.span_us[1])
-                self._file.close()
-                self.partial_path.replace(self.path)
-        finally:
-            self._file.close()
-            self.partial_path.unlink(missing_ok=True)
+        with ExitStack() as stack:
+            stack.push(self._naming)  # what goes wrong below is told to it as well
+            with self._file:
+                if error is not None:
+                    raise error
+                self._complete()
+
+    def _complete(self) -> None:
+        self._flush()
+        index = np.concatenate(self._index).astype(np.uint64)
+        self._file.create_dataset("ms_to_idx", data=index)
+        self._file.create_dataset("t_offset", data=np.int64(self._offset_us or 0))
+        if self.span_us is not None:
+            self._file.attrs.update(start_us=self.span_us[0], stop_us=self.span_us[1])
 
     def append(self, events: Events) -> None:
         """Add events that follow those already given.

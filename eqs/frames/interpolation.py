@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -15,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.files import file_sha256
+from eqs.files import complete_file, file_sha256
 
 Frame = NDArray[Any]
 
@@ -129,12 +128,8 @@ class CachedInterpolation:
             kept: Frame = np.load(path)
             return kept
         frames = self.inner.between(first, second)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Several processes may make the same frames; each writes its own file and renames it.
-        partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-        with partial.open("wb") as file:
+        with complete_file(path) as partial, partial.open("wb") as file:
             np.save(file, frames)
-        partial.replace(path)
         return frames
 
     def parameters(self) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from eqs.files import complete_file
 from eqs.metrics.definition import Definition
 from eqs.metrics.features import TappedBackbone, pooled_features
 from eqs.metrics.similarity import whitening_matrix
@@ -66,16 +67,12 @@ class Centre:
 
     def save(self, path: Path | str) -> None:
         """Write an npz file; it appears under its name only when it is complete."""
-        target = Path(path)
-        partial = target.with_name(target.name + ".partial")
         arrays: dict[str, Any] = {}
         for name, statistics in (("stage", self.means), ("covariance", self.covariances)):
             arrays |= {f"{name}_{k}": a for k, a in zip(self.stages, statistics, strict=False)}
         arrays |= {"tap": self.tap, "patches": self.patches, "features_hash": self.features_hash}
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as file:
+        with complete_file(path) as partial, partial.open("wb") as file:
             np.savez(file, sha256=self.sha256, **arrays)
-        partial.replace(target)
 
     @classmethod
     def load(cls, path: Path | str) -> Centre:

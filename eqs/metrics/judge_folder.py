@@ -9,7 +9,7 @@ from typing import Any
 
 import torch
 
-from eqs.files import read_json, write_json
+from eqs.files import complete_file, read_json, write_json
 from eqs.metrics.centre import Centre
 from eqs.metrics.definition import Definition
 from eqs.metrics.network import RVTShape, trained_backbone, weights_sha256
@@ -65,13 +65,11 @@ def write_judge(
     description: str,
 ) -> None:
     """Write what `read_judge` reads; weights that lie there already are kept."""
-    folder.mkdir(parents=True, exist_ok=True)
     digest = weights_sha256(backbone)
     if not _holds(folder / WEIGHTS, digest, shape):
-        partial = folder / f"{WEIGHTS}.partial"
-        weights = backbone.state_dict()
-        torch.save({f"backbone.{name}": x.cpu() for name, x in weights.items()}, partial)
-        partial.replace(folder / WEIGHTS)
+        weights = {f"backbone.{name}": x.cpu() for name, x in backbone.state_dict().items()}
+        with complete_file(folder / WEIGHTS) as partial:
+            torch.save(weights, partial)
     for centre in centres:
         centre.save(folder / file_of(centre))
     write_json(

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from eqs.events import EventReader
 from eqs.extras import DISTRIBUTION
-from eqs.files import write_json
+from eqs.files import complete_file, write_json
 from eqs.metrics import StreamScore, window_starts
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import Scoring, find_scoring
@@ -76,14 +76,12 @@ def score_files(cfg: DictConfig) -> None:
 
 def write_curve(path: Path, score: StreamScore, start_us: int, window_us: int) -> None:
     """Write the score of every window and whether it counts; the file appears when complete."""
-    partial = path.with_name(path.name + ".partial")
-    with partial.open("w", newline="") as file:
+    with complete_file(path) as partial, partial.open("w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(("stop_us", "eqs", "counts"))
         for number, value in enumerate(score.curve.tolist()):
             stop_us = start_us + (number + 1) * window_us
             rows.writerow((stop_us, value, number >= score.warmup))
-    partial.replace(path)
 
 
 def draw(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -15,8 +14,8 @@ from PIL import Image
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from eqs.events.writer import EventWriter
-from eqs.files import read_json, write_json
-from eqs.processors import available_cores
+from eqs.files import PARTIAL, one_at_a_time, read_json, write_json
+from eqs.processors import available_cores, side_by_side
 from eqs.scenes.camera import FrameCamera
 from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
@@ -93,13 +92,21 @@ class SequencePlan:
 
         Returns:
             The sequence's record: counts and description.
+
+        Raises:
+            ValueError: a folder of that name is there, which was not written here.
         """
         folder = root / self.split / self.name
         if (folder / RECORD).is_file():
             record = read_json(folder / RECORD)
             if record["description"] == self.description():
                 return record
-        partial = folder.with_name(folder.name + ".partial")
+        elif folder.exists():
+            raise ValueError(
+                f"Expected no folder at {folder} but those written here, got another; set "
+                "data.root to a new folder"
+            )
+        partial = folder.with_name(folder.name + PARTIAL)
         for old in (partial, folder):
             if old.exists():
                 shutil.rmtree(old)
@@ -243,29 +250,39 @@ class DSECMini:
     def generate(self, root: Path | str) -> Path:
         """Render what is missing below `root` and write `manifest.json` last.
 
-        Interrupted anywhere, the next call keeps the finished recordings.
+        Interrupted anywhere, the next call keeps the finished recordings. Of several processes that
+        ask for it at once, one renders and the others wait.
 
         Returns:
             `root`.
         """
         root = Path(root)
-        wanted = self._description()
+        if not self._is_complete(root):
+            with one_at_a_time(root, f"generating {root}"):
+                if not self._is_complete(root):
+                    self._generate(root)
+        return root
+
+    def _is_complete(self, root: Path) -> bool:
         manifest = root / "manifest.json"
-        if manifest.is_file() and read_json(manifest).get("parameters") == wanted:
-            return root
+        if not manifest.is_file():
+            return False
+        return bool(read_json(manifest).get("parameters") == self._description())
+
+    def _generate(self, root: Path) -> None:
+        (root / "manifest.json").unlink(missing_ok=True)  # it speaks of what may now change
         records = sorted(self._records(root), key=lambda record: str(record["name"]))
         self._remove_others(root)
         for record in records:
             del record["description"]
         write_json(
-            manifest,
+            root / "manifest.json",
             {
-                "parameters": wanted,
+                "parameters": self._description(),
                 "sensor_hash": self.sensor_hash,
                 "sequences": records,
             },
         )
-        return root
 
     def _description(self) -> dict[str, Any]:
         """Everything the files depend on, as it reads back from JSON."""
@@ -296,13 +313,7 @@ class DSECMini:
         recordings = self.recordings()
         workers = min(self.workers or available_cores(), len(recordings))
         jobs = [(recording, root) for recording in recordings]
-        if workers <= 1:
-            return self._follow(map(_write, jobs), len(jobs))
-        # A fresh interpreter per worker: nothing inherited, and the same on every system.
-        with multiprocessing.get_context("spawn").Pool(workers) as pool:
-            return self._follow(pool.imap_unordered(_write, jobs), len(jobs))
-
-    def _follow(self, records: Iterable[dict[str, Any]], total: int) -> list[dict[str, Any]]:
+        done = map(_write, jobs) if workers <= 1 else side_by_side(_write, jobs, workers)
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
@@ -310,7 +321,8 @@ class DSECMini:
             TimeRemainingColumn(),
         )
         with Progress(*columns) as progress:
-            return list(progress.track(records, total=total, description=f"dsec_mini {self.size}"))
+            description = f"dsec_mini {self.size}"
+            return list(progress.track(done, total=len(jobs), description=description))
 
 
 def _write(job: tuple[SequencePlan, Path]) -> dict[str, Any]:

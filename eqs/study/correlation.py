@@ -18,6 +18,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from eqs.files import write_text
 from eqs.study.statistics import (
     cluster_interval,
     pearson,
@@ -26,7 +27,7 @@ from eqs.study.statistics import (
     smallest_p,
     spearman,
 )
-from eqs.study.tables import simulated, summarise_study, write_text
+from eqs.study.tables import simulated, summarise_study
 
 SIMULATORS_NEEDED = 8
 """Below this many simulators a relation is reported as points, without a conclusion."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from eqs.files import write_text
 from eqs.names import REFERENCE
 from eqs.study.answer import answer
 from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
@@ -28,7 +29,6 @@ from eqs.study.tables import (
     RATIO_FLOOR,
     baseline_columns,
     summarise_study,
-    write_text,
 )
 
 MEDIA_TYPES = {".png": "image/png", ".svg": "image/svg+xml"}

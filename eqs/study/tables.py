@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from eqs.files import write_text
 from eqs.names import BASELINE, REFERENCE
 
 RATIO_FLOOR = 0.10
@@ -225,18 +225,6 @@ def write_table(table: pd.DataFrame, path: Path | str) -> Path:
     """Write a CSV that appears under its name only when it is complete."""
     path = Path(path)
     return write_text(table.to_csv(index=False), path)
-
-
-def write_text(text: str, path: Path) -> Path:
-    """Write text that appears under its name only when it is complete."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
-    return path
 
 
 def read_table(path: Path | str) -> pd.DataFrame:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from uuid import uuid4
 
 import h5py
 import hdf5plugin
 import numpy as np
 from numpy.typing import NDArray
+
+from eqs.files import complete_file
 
 
 def cached_histogram(
@@ -68,13 +69,7 @@ def _read(path: Path, shape: tuple[int, int, int]) -> NDArray[np.uint8]:
 
 
 def _write(path: Path, histogram: NDArray[np.uint8]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.{uuid4().hex}.partial")
     # Counts rarely use more than two of their eight bits, so bit planes pack best and fastest.
     packing = hdf5plugin.Blosc(cname="lz4", clevel=5, shuffle=hdf5plugin.Blosc.BITSHUFFLE)
-    try:
-        with h5py.File(partial, "w") as file:
-            file.create_dataset("histogram", data=histogram, chunks=histogram.shape, **packing)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with complete_file(path) as partial, h5py.File(partial, "w") as file:
+        file.create_dataset("histogram", data=histogram, chunks=histogram.shape, **packing)

@@ -1,5 +1,7 @@
 """Simulated streams on disk: written once, reused, renewed when anything changes."""
 
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 from eqs.data import RecordedEvents, Recording, SimulatedEvents
 from eqs.events import Events
 from eqs.files import read_json
+from eqs.processors import side_by_side
 from eqs.simulators import ESIM, V2E
 
 
@@ -91,3 +94,51 @@ def test_recorded_events_are_their_own_file(recording: Recording) -> None:
     real.prepare([recording])
     assert real.path(recording) == recording.events_path
     assert (real.name, real.label) == ("real", "real")
+
+
+def test_a_frame_that_keeps_name_and_size_is_simulated_anew(
+    tmp_path: Path, recording: Recording
+) -> None:
+    esim = source(tmp_path)
+    esim.prepare([recording])
+    before = esim.path(recording).read_bytes()
+    content = recording.frame_paths[1].read_bytes()
+    frames = [path.read_bytes() for path in recording.frame_paths]
+    recording.frame_paths[1].write_bytes(frames[2] + b"\0" * (len(content) - len(frames[2])))
+    esim.prepare([recording])
+    assert esim.path(recording).read_bytes() != before
+
+
+def test_a_foreign_file_in_the_place_of_a_stream_is_not_taken_for_it(
+    tmp_path: Path, recording: Recording
+) -> None:
+    esim = source(tmp_path)
+    esim.prepare([recording])
+    before = Events.load(esim.path(recording))
+    Events.empty(recording.height, recording.width).save(esim.path(recording))
+    esim.prepare([recording])
+    assert len(Events.load(esim.path(recording))) == len(before) > 0
+
+
+def test_two_that_want_one_stream_both_get_it_and_one_works(
+    tmp_path: Path, recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+
+    def counted(work, jobs, workers):
+        made.extend(jobs)
+        return map(work, jobs)
+
+    monkeypatch.setattr("eqs.data.simulated.side_by_side", counted)
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda _: source(tmp_path).prepare([recording]), range(2)))
+    assert len(made) == 1
+
+
+def test_who_stops_listening_stops_the_work(tmp_path: Path) -> None:
+    started = time.monotonic()
+    results = side_by_side(time.sleep, [0.0, *[60.0] * 4], 2)
+    next(results)
+    with pytest.raises(KeyboardInterrupt):
+        results.throw(KeyboardInterrupt)
+    assert time.monotonic() - started < 30
