@@ -27,7 +27,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 study: install ## Run the whole study on dsec_mini: generate, simulate, train, score, report
 	@$(VENV)/bin/python scripts/prepare.py
 	@printf '%s\n' real $(SIMULATORS) | xargs -P $(JOBS) -I{} $(VENV)/bin/python train.py sim={} \
-		jobs=$(JOBS) callbacks=lines ckpt_path=last
+		jobs=$(JOBS) callbacks=lines
 	@$(VENV)/bin/python evaluate.py --eqs
 	@printf '  %-24s%8.1f s\n' install "$$(cat $(INSTALLED))"
 

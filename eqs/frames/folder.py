@@ -93,6 +93,11 @@ class FrameFolder:
         """Shape of a frame, `(H, W)` grey or `(H, W, 3)` RGB, as the first image has it."""
         return read_image(self.paths[0]).shape
 
+    @property
+    def duration_us(self) -> int:
+        """Time from the first to the last frame."""
+        return int(self.timestamps_us[-1] - self.timestamps_us[0])
+
     def read(self, start: int, stop: int) -> NDArray[np.uint8]:
         """Frames `[start, stop)` as one array.
 

@@ -46,6 +46,17 @@ class VideoFile:
         except av.FFmpegError:
             return 0
 
+    @property
+    def duration_us(self) -> int:
+        """How long the file says that it plays, 0 where it does not say."""
+        import av
+
+        try:
+            with av.open(str(self.path)) as container:
+                return int(container.duration or 0) * 1_000_000 // av.time_base
+        except av.FFmpegError:
+            return 0
+
     def __iter__(self) -> Iterator[tuple[NDArray[Any], NDArray[np.int64]]]:
         """Chunks of frames with their times, from the first to the last."""
         images: list[NDArray[Any]] = []

@@ -36,6 +36,7 @@ class Centre:
             whitened features need; none in a centre of means alone.
         patches: patch vectors averaged, over all stages.
         features_hash: `Definition.features_hash` of the features; empty where nobody noted it.
+        recordings: hash of what the recordings hold; empty where nobody noted it.
 
     Raises:
         ValueError: there is not one mean, and one covariance or none, for each stage.
@@ -47,6 +48,7 @@ class Centre:
     covariances: tuple[NDArray[np.float32], ...] = ()
     patches: int = 0
     features_hash: str = ""
+    recordings: str = ""
 
     def __post_init__(self) -> None:
         """Check that every stage has its statistics."""
@@ -70,7 +72,8 @@ class Centre:
         arrays: dict[str, Any] = {}
         for name, statistics in (("stage", self.means), ("covariance", self.covariances)):
             arrays |= {f"{name}_{k}": a for k, a in zip(self.stages, statistics, strict=False)}
-        arrays |= {"tap": self.tap, "patches": self.patches, "features_hash": self.features_hash}
+        arrays |= {"tap": self.tap, "patches": self.patches}
+        arrays |= {"features_hash": self.features_hash, "recordings": self.recordings}
         with complete_file(path) as partial, partial.open("wb") as file:
             np.savez(file, sha256=self.sha256, **arrays)
 
@@ -92,7 +95,7 @@ class Centre:
                 spreads = (f"covariance_{stage}" for stage in stages)
                 covariances = tuple(data[name] for name in spreads if name in data)
                 tap, patches, stored = str(data["tap"]), int(data["patches"]), str(data["sha256"])
-                noted = str(data["features_hash"]) if "features_hash" in data else ""
+                noted = {n: str(data[n]) for n in ("features_hash", "recordings") if n in data}
         except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
             raise ValueError(
                 f"Expected a centre written by this package at {source}, got {error}; "
@@ -104,7 +107,7 @@ class Centre:
             means=means,
             covariances=covariances,
             patches=patches,
-            features_hash=noted,
+            **noted,
         )
         if centre.sha256 != stored:
             raise ValueError(

@@ -197,6 +197,7 @@ class Judge:
         taps: Sequence[str] = ("hidden",),
         *,
         chunk_windows: int | None = None,
+        content: str = "",
         **chosen: Any,  # noqa: ANN401
     ) -> Self:
         """The same judge with the mean features of real recordings; its headline is then centred.
@@ -205,6 +206,7 @@ class Judge:
             recordings: real recordings, those the network was trained on.
             taps: activations to compute a centre for.
             chunk_windows: windows per pass; chosen from the sensor size if None.
+            content: hash of what the recordings hold, which the centres keep.
             **chosen: how features are pooled and binned, where not as in the headline.
 
         Raises:
@@ -218,7 +220,8 @@ class Judge:
             chunk_windows=chunk_windows,
             device=self.device,
         )
-        new = {file_of(centre): centre for centre in made.values()}
+        noted = (replace(centre, recordings=content) for centre in made.values())
+        new = {file_of(centre): centre for centre in noted}
         kept = {file_of(centre): centre for centre in self.centres}
         headline = replace(self.definition, features="centred")
         return replace(self, definition=headline, centres=tuple({**kept, **new}.values()))

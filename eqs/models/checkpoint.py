@@ -109,8 +109,8 @@ def load_weights(model: nn.Module, path: str | Path, *, new_class_branch: bool =
     model.load_state_dict(weights)
 
 
-def check_resumable(model: nn.Module, path: str | Path) -> None:
-    """Refuse a checkpoint from which the training of a detector cannot go on.
+def check_resumable(model: nn.Module, path: str | Path) -> dict[str, Any]:
+    """The content of a checkpoint; one from which the training cannot go on is refused.
 
     Raises:
         FileNotFoundError: no such file.
@@ -132,6 +132,7 @@ def check_resumable(model: nn.Module, path: str | Path) -> None:
             f"Expected a training to resume in {path}, got a file without {', '.join(missing)}; "
             "set model.weights instead of ckpt_path to start from its weights"
         )
+    return content
 
 
 def check_entries(

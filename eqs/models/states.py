@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from torch import Tensor
+import torch
+from torch import Tensor, distributed
 
 from eqs.models.lstm import State
+from eqs.models.synchronised import processes
 
 States = list[State]
 
@@ -43,3 +45,30 @@ def gather_frames(features: Sequence[Tensor], keep: Tensor) -> list[Tensor]:
     # Indexing the channels-last memory keeps it channels-last.
     picked = [x.flatten(0, 1).permute(0, 2, 3, 1).index_select(0, index) for x in features]
     return [x.permute(0, 3, 1, 2) for x in picked]
+
+
+def of_all_processes(states: States | None) -> States | None:
+    """The states of the whole batch, on the CPU: those of the first process come first."""
+    if processes() == 1 or states is None:
+        return states
+    parts: list[States] = [[]] * processes()
+    distributed.all_gather_object(parts, move_states(states, torch.device("cpu")))
+    return [
+        (torch.cat([hidden for hidden, _ in stage]), torch.cat([cell for _, cell in stage]))
+        for stage in zip(*parts, strict=True)
+    ]
+
+
+def of_this_process(states: States | None) -> States | None:
+    """This process's part of the whole batch's states."""
+    if states is None:
+        return None
+    rank = distributed.get_rank() if processes() > 1 else 0
+    return [
+        (hidden.chunk(processes())[rank], cell.chunk(processes())[rank]) for hidden, cell in states
+    ]
+
+
+def move_states(states: States, device: torch.device) -> States:
+    """Recurrent states on another device."""
+    return [(hidden.to(device), cell.to(device)) for hidden, cell in states]

@@ -22,7 +22,7 @@ from eqs.frames import FrameFolder
 from eqs.metrics.baselines import baselines
 from eqs.pipelines.build import dataset
 from eqs.pipelines.command import explained
-from eqs.pipelines.judge import Scoring, find_scoring
+from eqs.pipelines.scoring import Scoring, find_scoring
 from eqs.simulators import Simulator
 from eqs.study import calibration_table, print_calibration, write_table
 

@@ -21,8 +21,14 @@ log = logging.getLogger(__name__)
 Result = TypeVar("Result")
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, with what is kept of the work."""
+
+
 def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig], Result]:
     """Turn an expected failure of a command into one logged sentence and exit status 1.
+
+    Ctrl-C ends in a sentence too, with the exit status that shells give it, 130.
 
     `HYDRA_FULL_ERROR=1` keeps the full traceback, as it does for Hydra's own errors.
     """
@@ -33,6 +39,10 @@ def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig],
         try:
             check_seed(cfg)
             return command(cfg)
+        except KeyboardInterrupt as stop:
+            kept = str(stop) or "whatever is complete is kept"
+            log.warning("interrupted: %s; type the same command again to go on", kept)
+            raise SystemExit(130) from None
         except (ValueError, OSError, InstantiationException, OmegaConfBaseException) as error:
             if os.environ.get("HYDRA_FULL_ERROR"):
                 raise

@@ -13,15 +13,19 @@ from omegaconf import DictConfig
 from rich.console import Console
 
 from eqs.data import EventSource
+from eqs.files import short_hash
 from eqs.names import BASELINE
 from eqs.pipelines.build import Dataset, dataset, event_source
 from eqs.pipelines.command import explained
-from eqs.pipelines.judge import find_scoring
+from eqs.pipelines.judge import require_judge
 from eqs.pipelines.publish import Findings, publish
+from eqs.pipelines.recipe import data_hash, differences, recipe
+from eqs.pipelines.resume import LISTED, NAMED_APART
 from eqs.pipelines.reverse import reverse_precision
-from eqs.pipelines.runs import Run, finished_runs, recipe_hash
+from eqs.pipelines.runs import Run, finished_runs
 from eqs.pipelines.sanity import sanity
 from eqs.pipelines.score import score_recordings
+from eqs.pipelines.scoring import find_scoring
 from eqs.pipelines.timing import phase_times
 from eqs.study import eqs_table, print_eqs, print_study, study_table, write_table
 
@@ -42,29 +46,41 @@ def evaluate(cfg: DictConfig) -> None:
     if cfg.sanity:
         sanity(cfg, results, console)
         return
-    runs = comparable_runs(cfg)
-    if runs:
-        study = study_table(study_rows(runs))
-        write_table(study, results / "study.csv")
-        if not cfg.score:
-            print_study(study, console)
-    elif not cfg.score:
-        raise ValueError(
-            f"Expected a finished run on {cfg.data.name} with this recipe, got none; "
-            "type `python train.py sim=esim` first, or repeat the overrides of the training"
-        )
+    found = list(finished_runs(Path(cfg.paths.runs) / cfg.data.name))
+    if cfg.score:
+        require_judge(cfg)  # before a data set is generated
+        for simulator in cfg.simulators.values():
+            event_source(simulator, cfg)
+    runs = comparable_runs(cfg, found) if found else []
     if cfg.score:
         score(cfg, runs, results, console)
+    elif runs:
+        study = study_table(study_rows(runs))
+        # Beside `study.csv`, which holds scores as well.
+        write_table(study, results / "accuracy.csv")
+        print_study(study, console)
+    else:
+        raise ValueError(
+            f"Expected a finished run on {cfg.data.name} with this recipe and these data, got "
+            "none; type `python train.py sim=esim` first, or repeat the overrides of the training"
+        )
 
 
-def comparable_runs(cfg: DictConfig) -> list[Run]:
-    """The finished runs that followed the configured recipe; others are named and left out."""
-    recipe = recipe_hash(cfg)
-    found = list(finished_runs(Path(cfg.paths.runs) / cfg.data.name))
-    kept = [run for run in found if run.result.recipe == recipe]
-    if len(kept) < len(found):
-        others = Counter(run.result.recipe for run in found if run not in kept)
-        log.info("left out %d run(s) of other recipes: %s", others.total(), ", ".join(others))
+def comparable_runs(cfg: DictConfig, found: Sequence[Run]) -> list[Run]:
+    """The runs of the configured recipe on the data as they are; others are named and left out."""
+    wanted, data = recipe(cfg), data_hash(dataset(cfg))
+    named = short_hash(wanted)
+    kept = [run for run in found if (run.result.recipe, run.result.data) == (named, data)]
+    for run in found:
+        if run in kept:
+            continue
+        there = {key: value for key, value in run.recipe().items() if key not in NAMED_APART}
+        reasons = differences(there, wanted) if run.result.recipe != named and there else []
+        if run.result.data != data:
+            reasons.insert(0, "other data")
+        shown = ", ".join(reasons[:LISTED]) or "another recipe"
+        more = f" and {len(reasons) - LISTED} more" if len(reasons) > LISTED else ""
+        log.info("left out %s: %s%s", run.folder, shown, more)
     return kept
 
 
@@ -87,6 +103,7 @@ def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
                 **{f"ap_real_{name}": value for name, value in real.map_per_class.items()},
                 "protocol": result.protocol["hash"],
                 "recipe": result.recipe,
+                "data": result.data,
             }
         )
     return rows

@@ -1,13 +1,13 @@
-"""What a command scores with: the judge that is found, made or given, and what it reads."""
+"""The judge of a command: found among the trainings, made of one, or given."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from hydra.utils import instantiate
@@ -15,12 +15,12 @@ from omegaconf import DictConfig
 
 from eqs.data import DSECFolder
 from eqs.events import EventReader
-from eqs.metrics import EventQualityScore, Judge, Reading, StreamScore
-from eqs.metrics.definition import choices
+from eqs.files import short_hash
+from eqs.metrics import Judge
 from eqs.metrics.judge_folder import RECORD
-from eqs.metrics.scoring import Watcher
 from eqs.pipelines.build import Dataset
-from eqs.pipelines.runs import Run, finished_runs, recipe_hash
+from eqs.pipelines.recipe import data_hash, recipe_hash
+from eqs.pipelines.runs import Run, finished_runs
 
 log = logging.getLogger(__name__)
 EMBEDDED_DATA = "dsec_mini"
@@ -28,112 +28,110 @@ EMBEDDED_DATA = "dsec_mini"
 KEPT_TAPS = ("hidden", "gate", "downsample")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Scoring:
-    """The metric of a command with every reading that it reports.
+class Found(NamedTuple):
+    """A judge and where it comes from.
 
     Args:
-        metric: the headline, on the device that scores.
-        readings: every reading, the headline first.
+        judge: the judge.
+        folder: where centres that it lacks are kept.
+        training: the data to centre it on, where that is known.
+        given: hashes of centres that came with it and stay, whatever data there are.
     """
 
-    metric: EventQualityScore
-    readings: tuple[Reading, ...]
-
-    @property
-    def judge(self) -> Judge:
-        """Network, hashes and description of what scores."""
-        return self.metric.judge
-
-    @property
-    def headline(self) -> Reading:
-        """The reading that is the column `eqs`."""
-        return self.metric.reading
-
-    def score(
-        self,
-        real: EventReader | Any,  # noqa: ANN401
-        candidates: Sequence[Any],
-        *,
-        start_us: int,
-        stop_us: int,
-        watch: Watcher | None = None,
-    ) -> list[dict[str, StreamScore]]:
-        """Every reading of every candidate, in one pass of the judge."""
-        limits = {"start_us": start_us, "stop_us": stop_us}
-        return self.metric.score(real, candidates, self.readings, **limits, watch=watch)
+    judge: Judge
+    folder: Path
+    training: Dataset | None
+    given: frozenset[str] = frozenset()
 
 
-def find_scoring(cfg: DictConfig, data: Dataset | None) -> Scoring:
-    """The configured judge and choices, with the centres that they need.
-
-    Args:
-        cfg: a configuration with `eqs`, `taps` and `device`.
-        data: the data set, whose training recordings a judge without centres is centred on.
+def require_judge(cfg: DictConfig) -> None:
+    """See that there will be a judge and a device, before there is a data set.
 
     Raises:
-        ValueError: there is no judge, or no such device, or a choice does not fit the judge.
+        FileNotFoundError: the named judge does not exist.
+        ValueError: none is named and no detector was trained on a real stream, or there is no such
+            device here.
     """
-    device = scoring_device(cfg.device)
-    judge, folder, training = find_judge(cfg, data)
-    judge.to(device)
-    chosen = {name: cfg.eqs[name] for name in choices() if cfg.eqs[name] is not None}
-    definition = judge.define(**chosen)
-    taps = list(dict.fromkeys([definition.tap, *cfg.taps]))
-    missing = [tap for tap in taps if judge.centre_for(replace(definition, tap=tap)) is None]
-    if missing and training is not None:
-        judge = centred(judge, training, missing, cfg.eqs.chunk_windows, chosen)
-        judge.save(folder)
-    # Partial, since Hydra would take the judge for a configuration and open it.
-    metric = instantiate(cfg.eqs, _partial_=True)(judge=judge).to(device)
-    return Scoring(metric=metric, readings=readings_of(metric, taps))
+    scoring_device(cfg.device)
+    if cfg.eqs.judge not in (None, "random") and not Path(cfg.eqs.judge).exists():
+        raise FileNotFoundError(f"Expected a judge at {cfg.eqs.judge}, found none; set eqs.judge")
+    if cfg.eqs.judge is None and not trained_on_real(cfg):
+        raise ValueError(
+            "Expected a judge trained on real events, got none: type `python train.py sim=real` "
+            "first, or set eqs.judge to a judge's folder or a checkpoint"
+        )
 
 
-def find_judge(cfg: DictConfig, data: Dataset | None) -> tuple[Judge, Path, Dataset | None]:
-    """The judge that is named, or a detector trained on the real stream of this data.
-
-    Of several detectors the one that followed the configured recipe is taken, else the newest.
-
-    Returns:
-        The judge, the folder that keeps it, and the data to centre it on where that is known.
-
-    Raises:
-        ValueError: none is named and no detector was trained on a real stream.
-    """
-    if cfg.eqs.judge is not None:
-        return _given_judge(cfg, data)
+def trained_on_real(cfg: DictConfig) -> list[Run]:
+    """Detectors trained on the real stream of the configured data, or else of the embedded ones."""
     for name in dict.fromkeys([cfg.data.name, EMBEDDED_DATA]):
         found = finished_runs(Path(cfg.paths.runs) / name)
         trained = [run for run in found if run.result.simulator == "real"]
         if trained:
-            recipe = recipe_hash(cfg)
-            ranks = {(run.result.recipe == recipe, run.finished_ns): run for run in trained}
-            run = ranks[max(ranks)]
-            if name != cfg.data.name:
-                log.warning(
-                    "The judge was trained on %s, another world than %s: its scores rank streams, "
-                    "but their level means little; set eqs.judge to one trained on such data",
-                    name,
-                    cfg.data.name,
-                )
-            return judge_of(run), run.folder, _data_of(run)
-    raise ValueError(
-        "Expected a judge trained on real events, got none: type `python train.py sim=real` first, "
-        "or set eqs.judge to a judge's folder or a checkpoint"
-    )
+            return trained
+    return []
 
 
-def _given_judge(cfg: DictConfig, data: Dataset | None) -> tuple[Judge, Path, Dataset | None]:
+def find_judge(cfg: DictConfig, data: Dataset | None) -> Found:
+    """The judge that is named, or a detector trained on the real stream of this data.
+
+    Of several detectors the one that followed the configured recipe on the data as they are is
+    taken, else the newest.
+
+    Raises:
+        FileNotFoundError: the named judge does not exist.
+        ValueError: none is named and no detector was trained on a real stream.
+    """
+    require_judge(cfg)
+    if cfg.eqs.judge is not None:
+        return _given_judge(cfg, data)
+    recipe, content = recipe_hash(cfg), None if data is None else data_hash(data)
+    ranks = {
+        (run.result.recipe == recipe, run.result.data == content, run.finished_ns): run
+        for run in trained_on_real(cfg)
+    }
+    run = ranks[max(ranks)]
+    name = run.folder.parents[1].name
+    if name != cfg.data.name:
+        log.warning(
+            "The judge was trained on %s, another world than %s: its scores rank streams, but "
+            "their level means little; set eqs.judge to one trained on such data",
+            name,
+            cfg.data.name,
+        )
+    elif content is not None and run.result.data != content:
+        log.warning(
+            "The judge was trained when %s held other recordings; train.py sim=real makes one for "
+            "those that are there now",
+            name,
+        )
+    return Found(judge_of(run), run.folder, _data_of(run))
+
+
+def _given_judge(cfg: DictConfig, data: Dataset | None) -> Found:
     judge = Judge.load(cfg.eqs.judge, cfg.eqs.partition_split_32)
     place = Path(cfg.eqs.judge)
-    folder = place if place.is_dir() else place.parent
-    if (folder / RECORD).is_file():
-        run = Run(folder)
-        return judge, folder, _data_of(run) if run.finished else data
+    run = Run(place if place.is_dir() else place.parent)
+    if run.finished and (run.folder / RECORD).is_file():
+        return Found(judge, run.folder, _data_of(run))
+    # A judge that somebody made stays as it is; what it lacks here is kept with our results.
+    given = frozenset(centre.sha256 for centre in judge.centres)
     folder = Path(cfg.paths.results) / cfg.data.name / f"judge-{judge.weights_sha256[:12]}"
     if (folder / RECORD).is_file():
-        judge = Judge.load(folder)
-    return judge, folder, data if isinstance(data, DSECFolder) else None
+        kept = Judge.load(folder)
+        made = tuple(centre for centre in kept.centres if centre.sha256 not in given)
+        judge = replace(judge, centres=(*judge.centres, *made)) if given else kept
+    return Found(judge, folder, data if isinstance(data, DSECFolder) else None, given)
+
+
+def training_content(data: Dataset | None) -> str:
+    """Hash of what the training recordings hold; empty where there are none to be read."""
+    if data is None:
+        return ""
+    try:
+        return short_hash([recording.content_hash() for recording in data.recordings("train")])
+    except (ValueError, OSError):  # not there any more, or never labelled to be trained on
+        return ""
 
 
 def judge_of(run: Run) -> Judge:
@@ -184,26 +182,9 @@ def centred(
             stack.enter_context(EventReader(r.events_path, r.height, r.width, data.crop_rows))
             for r in data.recordings("train")
         )
-        return judge.centred_on(streams, taps, chunk_windows=chunk_windows, **chosen)
-
-
-def readings_of(metric: EventQualityScore, taps: Sequence[str]) -> tuple[Reading, ...]:
-    """The metric's own reading, then every tap raw and, where there are centres, otherwise too."""
-    judge, headline = metric.judge, metric.reading.definition
-    kinds = ["raw", *sorted({"centred", headline.features} - {"raw"})]
-    readings = []
-    for features in kinds:
-        for tap in taps:
-            definition = replace(headline, tap=tap, features=features)
-            centre = None if features == "raw" else judge.centre_for(definition)
-            if features == "raw" or centre is not None:
-                readings.append(Reading(definition=definition, centre=centre))
-
-    def distance_to_headline(reading: Reading) -> tuple[bool, bool]:
-        chosen = reading.definition
-        return chosen.tap != headline.tap, chosen.features != headline.features
-
-    return tuple(sorted(readings, key=distance_to_headline))
+        return judge.centred_on(
+            streams, taps, chunk_windows=chunk_windows, content=training_content(data), **chosen
+        )
 
 
 def scoring_device(name: str) -> torch.device:

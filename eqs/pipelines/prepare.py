@@ -13,10 +13,11 @@ from eqs.pipelines.timing import PhaseTimes, phase_times
 @explained
 def prepare(cfg: DictConfig) -> None:
     """Generate or check the data set, then run every configured simulator over it."""
+    sources = [event_source(simulator, cfg) for simulator in cfg.simulators.values()]
     times = phase_times(cfg)
     data = prepare_data(cfg, times)
-    for simulator in cfg.simulators.values():
-        prepare_stream(event_source(simulator, cfg), data, times)
+    for source in sources:
+        prepare_stream(source, data, times)
 
 
 def prepare_data(cfg: DictConfig, times: PhaseTimes) -> Dataset:

@@ -18,7 +18,8 @@ class RunResult:
         simulator: name of the simulator, or `real`.
         system: name of the very stream, which differs with every setting.
         seed: of the training.
-        recipe: hash of whatever a training depends on but stream and seed.
+        recipe: hash of every setting that a training depends on but stream and seed.
+        data: hash of what the recordings hold.
         own: accuracy on the test events of the stream that was trained on.
         real: accuracy on the real test events.
         protocol: what counted, with its hash.
@@ -29,6 +30,7 @@ class RunResult:
     system: str
     seed: int
     recipe: str
+    data: str
     own: Accuracy
     real: Accuracy
     protocol: dict[str, Any]

@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import logging
+import shutil
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
-from eqs import __version__
-from eqs.files import short_hash
+from eqs.files import complete_file, read_json, write_json
 from eqs.pipelines.result import RunResult
 
-# What makes two detectors comparable: everything a training depends on but stream and seed ...
-RECIPE_KEYS = ("data", "protocol", "model", "recipe", "datamodule", "task")
-# ... and nothing that only says where files lie or how many processes read them.
-INCIDENTAL = {"data": {"root", "workers"}, "datamodule": {"seed", "num_workers", "histogram_cache"}}
-
-
-def recipe_hash(cfg: DictConfig) -> str:
-    """Hash of the training recipe: equal for runs that differ only in stream and seed."""
-    recipe = {
-        key: {
-            name: OmegaConf.to_container(value, resolve=True)
-            if OmegaConf.is_config(value)
-            else value
-            for name, value in cfg[key].items()
-            if name not in INCIDENTAL.get(key, ())
-        }
-        for key in RECIPE_KEYS
-    }
-    return short_hash({**recipe, "version": __version__})
+log = logging.getLogger(__name__)
+REPLACED = ".replaced"  # ends the name of a finished run that is about to be trained anew
 
 
 @dataclass(frozen=True)
@@ -39,7 +24,7 @@ class Run:
     """The folder of one training.
 
     Args:
-        folder: `<runs>/<data>/<stream>/<recipe>-seed<seed>`.
+        folder: `<runs>/<data>/<stream>/<recipe and data>-seed<seed>`.
     """
 
     folder: Path
@@ -78,9 +63,27 @@ class Run:
         """
         return RunResult.load(self.folder / "result.json")
 
+    @property
+    def _replaced(self) -> Run:
+        return Run(self.folder.with_name(self.folder.name + REPLACED))
+
+    def put_aside(self) -> None:
+        """Make room for a training that replaces this one, whose result stays until it is there."""
+        if self.finished:
+            shutil.rmtree(self._replaced.folder, ignore_errors=True)
+            self.folder.rename(self._replaced.folder)
+        else:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
     def finish(self, result: RunResult) -> None:
-        """Mark the run as finished."""
+        """Mark the run as finished; the one that it replaces, if any, goes."""
         result.save(self.folder / "result.json")
+        shutil.rmtree(self._replaced.folder, ignore_errors=True)
+
+    def recipe(self) -> dict[str, Any]:
+        """Every setting of the training by its key, as it was begun; none in older runs."""
+        path = self.folder / "recipe.json"
+        return read_json(path) if path.is_file() else {}
 
     def config(self) -> DictConfig:
         """The configuration the run was started with."""
@@ -89,13 +92,26 @@ class Run:
             raise ValueError(f"Expected a configuration in {self.folder}, got a list; delete it")
         return config
 
-    def save_config(self, cfg: DictConfig) -> None:
+    def save_config(self, cfg: DictConfig, recipe: Mapping[str, Any]) -> None:
         """Keep what the run was asked, with every interpolation resolved."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        OmegaConf.save(cfg, self.folder / "config.yaml", resolve=True)
+        with complete_file(self.folder / "config.yaml") as partial:
+            OmegaConf.save(cfg, partial, resolve=True)
+        write_json(self.folder / "recipe.json", recipe)
 
 
 def finished_runs(root: Path) -> Iterator[Run]:
-    """Every finished run of one data set, in the order of their names."""
+    """Every finished run of one data set, in the order of their names.
+
+    A run that is being trained anew counts as it was; what cannot be read is named and left out.
+    """
     for path in sorted(root.glob("*/*/result.json")):
-        yield Run(path.parent)
+        run = Run(path.parent)
+        anew = Run(run.folder.with_name(run.folder.name.removesuffix(REPLACED)))
+        if anew.folder != run.folder and anew.finished:
+            continue
+        try:
+            _ = run.result
+        except ValueError as error:
+            log.warning("left out: %s", error)
+            continue
+        yield run

@@ -17,8 +17,8 @@ from eqs.drawing import save_figure
 from eqs.events import EventReader, Events
 from eqs.metrics import EXPECTED_ORDER, GRADED, singles
 from eqs.pipelines.build import dataset
-from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import ANCHOR_US
+from eqs.pipelines.scoring import Scoring, find_scoring
 from eqs.study import print_sanity, sanity_figure, sanity_table, write_table
 
 AT_ONCE = 8  # streams of one pass of the judge

@@ -18,7 +18,7 @@ from eqs.metrics import EventQualityScore, anchors
 from eqs.metrics.baselines import FeatureFrechet, baselines
 from eqs.metrics.definition import choices
 from eqs.names import BASELINE
-from eqs.pipelines.judge import Scoring
+from eqs.pipelines.scoring import Scoring
 
 # Anchors and baselines hold events in memory: a long recording lends its first quarter minute.
 ANCHOR_US = 15_000_000

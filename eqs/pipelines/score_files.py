@@ -17,8 +17,8 @@ from eqs.extras import DISTRIBUTION
 from eqs.files import complete_file, write_json
 from eqs.metrics import StreamScore, window_starts
 from eqs.pipelines.command import explained
-from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import score_anchors
+from eqs.pipelines.scoring import Scoring, find_scoring
 
 log = logging.getLogger(__name__)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,10 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from eqs.content import content_hash, content_hashes
 from eqs.data.simulated import write_stream
-from eqs.files import read_json, whole_numbers, write_json
+from eqs.events.writer import LONGEST_US
+from eqs.files import one_at_a_time, read_json, short_hash, whole_numbers, write_json
 from eqs.frames import FrameFolder, VideoFile, image_paths
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
@@ -55,29 +58,72 @@ def simulate_clip(simulator: Simulator, cfg: DictConfig) -> None:
     """Write `cfg.out`, a DSEC event file, from a folder of images or a video.
 
     Beside it lies `<out>.json`, which says how it was made; a file that was made the same way from
-    the same frames is kept.
+    the same frames is kept, any other is left alone unless `overwrite` is set.
 
     Raises:
-        ValueError: there are other events already.
+        ValueError: something else is there already, a folder or the clip itself, or the clip is longer than a file can hold.
     """
     out, source = Path(cfg.out), Path(cfg.frames)
-    record = out.with_name(out.name + ".json")
+    if out.is_dir():
+        raise ValueError(
+            f"Expected a file to write at {out}, got a folder; set out={out}/events.h5"
+        )
+    if out.exists() and source.exists() and out.samefile(source):
+        raise ValueError(f"Expected events beside the clip, got out={out} for both; set out")
+    clip = open_clip(source, cfg.frames_per_second)
+    check_duration(clip)
     description = {
         "simulator": simulator.name,
         "parameters": simulator.parameters(),
         "version": simulator.version,
-        "frames": fingerprint(source, cfg.frames_per_second),
+        "sequence": out.stem,
+        "frames": contents(clip),
     }
-    if out.exists() and record.exists() and not cfg.overwrite:
-        if read_json(record)["description"] == description:
+    record = out.with_name(out.name + ".json")
+    if record.exists() and "description" not in read_json(record):
+        raise ValueError(
+            f"Expected a record of this command at {record}, got another file; set out"
+        )
+    with one_at_a_time(out, f"making {out}"):
+        if out.exists() and not cfg.overwrite:
+            refuse_others(out, record, description)
             log.info("%s is made of these frames already; overwrite=true makes it again", out)
             return
-        raise ValueError(
-            f"Expected no other events at {out}, got some; set out, or overwrite=true to replace"
-        )
-    frames, events = write_events(simulator, open_clip(source, cfg.frames_per_second), out)
-    write_json(record, {"description": description, "events": events, "frames": frames})
+        frames, events = write_events(simulator, clip, out)
+        made = {"events": events, "frames": frames, "file": content_hash(out)}
+        write_json(record, {"description": description, **made})
     log.info("%s: %d events from %d frames", out, events, frames)
+
+
+def refuse_others(out: Path, record: Path, description: Mapping[str, Any]) -> None:
+    """Let nobody lose a file that was not made by this very command.
+
+    Raises:
+        ValueError: nothing says how the file was made, or it was made otherwise or changed since.
+    """
+    said = read_json(record) if record.is_file() else {}
+    if said.get("file") != content_hash(out):
+        found = "a file that this command did not write, or that was changed since"
+    elif said.get("description") != description:
+        found = "events made of other frames or with other parameters"
+    else:
+        return
+    raise ValueError(
+        f"Expected no other events at {out}, got {found}; set out, or overwrite=true to replace it"
+    )
+
+
+def check_duration(clip: FrameFolder | VideoFile) -> None:
+    """Refuse a clip whose events no file of DSEC's layout can hold, before it is simulated.
+
+    Raises:
+        ValueError: it is too long.
+    """
+    if clip.duration_us > LONGEST_US:
+        raise ValueError(
+            f"Expected a clip of at most {LONGEST_US} us, which 32-bit times can count, got "
+            f"{clip.duration_us} us; set frames to a part of it"
+        )
 
 
 def open_clip(source: Path, frames_per_second: float | None) -> FrameFolder | VideoFile:
@@ -135,10 +181,8 @@ def rates(seconds: float | None, frames: int, events: int) -> str:
     return f"{frames / seconds:.0f} frames/s, {events / seconds / 1e6:.2f} Mev/s"
 
 
-def fingerprint(source: Path, frames_per_second: float | None) -> dict[str, Any]:
-    """What tells one set of frames from another: names, sizes and times of change."""
-    paths = image_paths(source) if source.is_dir() else [source] if source.is_file() else []
-    return {
-        "files": [[path.name, path.stat().st_size, path.stat().st_mtime_ns] for path in paths],
-        "frames_per_second": frames_per_second,
-    }
+def contents(clip: FrameFolder | VideoFile) -> str:
+    """What tells one clip from another: what its files hold, and the times of its frames."""
+    if isinstance(clip, VideoFile):
+        return content_hash(clip.path)
+    return short_hash([clip.timestamps_us.tolist(), content_hashes(clip.paths)])

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import logging
-import shutil
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import lightning
 import torch
 from hydra.utils import instantiate
-from lightning.pytorch.callbacks import Callback, ModelCheckpoint
 from omegaconf import DictConfig
 from rich.console import Console
 
 from eqs.data import EventSource, LabelProtocol, RecordedEvents
-from eqs.files import short_hash
-from eqs.models.checkpoint import check_resumable
-from eqs.pipelines.build import event_source
+from eqs.files import one_at_a_time, short_hash
+from eqs.pipelines.build import Dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import write_judge
 from eqs.pipelines.prepare import prepare_data, prepare_stream
+from eqs.pipelines.recipe import data_hash, recipe, recipe_hash, trials
 from eqs.pipelines.result import RunResult
-from eqs.pipelines.runs import Run, recipe_hash
+from eqs.pipelines.resume import checkpoint_path, identity_of, shorter_config
+from eqs.pipelines.runs import Run
 from eqs.pipelines.timing import PhaseTimes, phase_times
+from eqs.pipelines.trainer import build_trainer, check_trainer, resumable
 from eqs.processors import available_cores
 from eqs.training import DetectionTask
 
@@ -31,56 +34,133 @@ log = logging.getLogger(__name__)
 
 
 @explained
-def train(cfg: DictConfig) -> RunResult:
-    """Train and test as configured; a finished run is reported, not repeated."""
+def train(cfg: DictConfig) -> RunResult | None:
+    """Train and test as configured; a finished run is reported, an interrupted one gone on with.
+
+    Returns:
+        What the run measured; None where the training was only tried out, and from all processes
+        but the first.
+    """
     source = event_source(cfg.sim, cfg)
-    runs = Path(cfg.paths.runs) / cfg.data.name
-    run = Run(runs / source.label / f"{recipe_hash(cfg)}-seed{cfg.seed}")
-    if run.finished and not cfg.overwrite:
-        log.info("%s is finished already; overwrite=true trains it again", run.folder)
-    else:
-        execute(cfg, run, source, phase_times(cfg))
-    show(run.result)
-    return run.result
+    protocol: LabelProtocol = instantiate(cfg.protocol)
+    first = check_trainer(cfg)
+    recipe(cfg)
+    times = phase_times(cfg)
+    data = prepare_data(cfg, times)
+    job = Job.of(cfg, source, data, protocol)
+    if not first:  # a process that the first one started, which holds the lock and reports
+        execute(job, times)
+        return None
+    with one_at_a_time(job.run.folder, f"training {job.run.folder}"):
+        if job.run.finished and not cfg.overwrite:
+            log.info("%s is finished already; overwrite=true trains it again", job.run.folder)
+        elif not execute(job, times):
+            return None
+    show(job.run.result)
+    return job.run.result
 
 
-def execute(cfg: DictConfig, run: Run, source: EventSource, times: PhaseTimes) -> None:
-    """Do the work of one run and record what it measured."""
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One training: what is asked, of what data, and where it is kept.
+
+    Args:
+        cfg: the configuration.
+        source: the events to train on.
+        data: the data set.
+        protocol: which boxes count.
+        identity: what its checkpoints say of it.
+        run: its folder.
+        shorter: the training that it goes on from for longer, if it does.
+    """
+
+    cfg: DictConfig
+    source: EventSource
+    data: Dataset
+    protocol: LabelProtocol
+    identity: Mapping[str, Any]
+    run: Run
+    shorter: Run | None
+
+    @classmethod
+    def of(
+        cls, cfg: DictConfig, source: EventSource, data: Dataset, protocol: LabelProtocol
+    ) -> Job:
+        """The training of a configuration."""
+        content, shorter = data_hash(data), shorter_config(cfg)
+        return cls(
+            cfg=cfg,
+            source=source,
+            data=data,
+            protocol=protocol,
+            identity=identity_of(cfg, source.label, content),
+            run=run_of(cfg, source, content),
+            shorter=None if shorter is None else run_of(shorter, source, content),
+        )
+
+
+def run_of(cfg: DictConfig, source: EventSource, data: str) -> Run:
+    """The folder of a training, whose name covers every setting and what the data hold."""
+    runs = Path(cfg.paths.runs) / cfg.data.name / source.label
+    return Run(runs / f"{short_hash([recipe_hash(cfg), data])}-seed{cfg.seed}")
+
+
+def execute(job: Job, times: PhaseTimes) -> bool:
+    """Do the work of one run; says whether it left a result, as all but trials do."""
+    cfg, run, source = job.cfg, job.run, job.source
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
     torch.set_num_threads(max(1, available_cores() // cfg.jobs))
     tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
     if isinstance(source, RecordedEvents):
         del tests["own"]  # on the recorded events both tests are the same one
-    protocol = instantiate(cfg.protocol)
-    task = build_task(cfg, protocol, list(tests))
-    checkpoint = checkpoint_path(cfg, run)
-    if checkpoint is not None:
-        check_resumable(task.model, checkpoint)
-    data = prepare_data(cfg, times)
-    prepare_stream(source, data, times)
-    if cfg.overwrite:  # only now: everything that can be refused was looked at
-        shutil.rmtree(run.folder, ignore_errors=True)
-    run.save_config(cfg)
+    task = build_task(cfg, job.protocol, list(tests))
+    checkpoint = checkpoint_path(cfg, run, job.shorter, job.identity, task.model)
+    trainer = build_trainer(cfg, run, job.identity)
+    prepare_stream(source, job.data, times)
     datamodule = instantiate(cfg.datamodule)(
-        dataset=data, protocol=protocol, source=source, tests=tests
+        dataset=job.data, protocol=job.protocol, source=source, tests=tests
     )
-    trainer = build_trainer(cfg, run)
+    datamodule.prepare_data()
+    if trainer.is_global_zero:  # only now: everything that can be refused was looked at
+        if cfg.overwrite:
+            run.put_aside()
+        run.save_config(cfg, job.identity)
     with times.measure(f"train {source.name}", resumed=checkpoint is not None):
         start = time.perf_counter()
-        trainer.fit(task, datamodule, ckpt_path=checkpoint)
-        trainer.save_checkpoint(run.weights, weights_only=True)
-        trainer.test(task, datamodule, verbose=False)
+        with resumable(run):
+            trainer.fit(task, datamodule, ckpt_path=checkpoint)
+            trainer.test(task, datamodule, verbose=False)
         seconds = time.perf_counter() - start
-    if isinstance(source, RecordedEvents) and trainer.is_global_zero:
+    tried = trials(cfg)
+    if tried:
+        log.warning("a trial, because of %s: it leaves no result", ", ".join(tried))
+        return False
+    finish(job, trainer, task, seconds, times)
+    return True
+
+
+def finish(
+    job: Job,
+    trainer: lightning.Trainer,
+    task: DetectionTask,
+    seconds: float,
+    times: PhaseTimes,
+) -> None:
+    """Keep the weights, the judge that they may be, and, last, what was measured."""
+    trainer.save_checkpoint(job.run.weights, weights_only=True)
+    if not trainer.is_global_zero:
+        return
+    if isinstance(job.source, RecordedEvents):
         with times.measure("judge"):
-            write_judge(cfg, run, data, trainer.strategy.root_device)
-    real, card = task.measured["real"], protocol.card()
-    run.finish(
+            write_judge(job.cfg, job.run, job.data, trainer.strategy.root_device)
+    real, card = task.measured["real"], job.protocol.card()
+    job.run.finish(
         RunResult(
-            simulator=source.name,
-            system=source.label,
-            seed=cfg.seed,
-            recipe=recipe_hash(cfg),
+            simulator=job.source.name,
+            system=job.source.label,
+            seed=job.cfg.seed,
+            recipe=recipe_hash(job.cfg),
+            data=job.identity["data"],
             own=task.measured.get("own", real),  # a detector of real events has one test
             real=real,
             protocol={**card, "hash": short_hash(card)},
@@ -97,44 +177,6 @@ def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]
     build = instantiate(cfg.task)
     task: DetectionTask = build(model=model, protocol=protocol, test_streams=test_streams)
     return task
-
-
-def build_trainer(cfg: DictConfig, run: Run) -> lightning.Trainer:
-    """The configured trainer, writing into the run's folder."""
-    last = ModelCheckpoint(
-        run.checkpoints,
-        filename="last",
-        save_on_train_epoch_end=True,  # every epoch's, not only those that end in a validation
-        enable_version_counter=False,
-    )
-    best = ModelCheckpoint(
-        run.checkpoints,
-        filename="best",
-        monitor="val/map",
-        mode="max",
-        save_weights_only=True,
-        enable_version_counter=False,
-    )
-    callbacks: list[Callback] = [last, best, *instantiate(cfg.callbacks).values()]
-    loggers = [logger(save_dir=run.folder) for logger in instantiate(cfg.logger).values()]
-    trainer: lightning.Trainer = instantiate(cfg.trainer, callbacks=callbacks, logger=loggers)
-    return trainer
-
-
-def checkpoint_path(cfg: DictConfig, run: Run) -> Path | None:
-    """Where to resume: the run's newest checkpoint, a given file, or nowhere.
-
-    Raises:
-        FileNotFoundError: the given file does not exist.
-    """
-    if cfg.ckpt_path is None:
-        return None
-    if cfg.ckpt_path == "last":
-        return run.last_checkpoint if run.last_checkpoint.exists() and not cfg.overwrite else None
-    path = Path(cfg.ckpt_path)
-    if not path.is_file():
-        raise FileNotFoundError(f"Expected a checkpoint at {path}, found none; set ckpt_path")
-    return path
 
 
 def show(result: RunResult) -> None:

@@ -20,14 +20,13 @@ from eqs.study.tables import (
     Drops,
     drops,
     eqs_table,
-    read_table,
     scaled_score,
     simulated,
     study_table,
     summarise_eqs,
     summarise_study,
-    write_table,
 )
+from eqs.study.written import read_table, write_table
 
 __all__ = [
     "FIGURE_TEXTS",

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from eqs.files import write_text
 from eqs.names import BASELINE, REFERENCE
 
 RATIO_FLOOR = 0.10
@@ -47,7 +46,8 @@ EQS_COLUMNS = (
     "weights_sha256",
 )
 TEXT_COLUMNS = frozenset(
-    {"simulator", "system", "sequence", "split", "definition", "weights_sha256", "protocol"}
+    {"simulator", "system", "sequence", "split", "corruption", "anchor"}
+    | {"definition", "weights_sha256", "protocol", "recipe", "data"}
 )
 COUNT_COLUMNS = ("n_windows", "n_events_real", "n_events_sim")
 
@@ -219,30 +219,6 @@ def summarise_eqs(scores: pd.DataFrame) -> pd.DataFrame:
 def simulated(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of simulators: the real reference is an upper bound, not a system under test."""
     return table[table["simulator"] != REFERENCE]
-
-
-def write_table(table: pd.DataFrame, path: Path | str) -> Path:
-    """Write a CSV that appears under its name only when it is complete."""
-    path = Path(path)
-    return write_text(table.to_csv(index=False), path)
-
-
-def read_table(path: Path | str) -> pd.DataFrame:
-    """Read a CSV of the study; names and hashes stay text, even where they look like numbers.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(
-            f"Expected a table {path.name} in {path.parent.name}/, found none; "
-            "run evaluate.py first"
-        )
-    header = pd.read_csv(path, nrows=0).columns
-    text = {name: str for name in header if name in TEXT_COLUMNS or name.endswith("_hash")}
-    table = pd.read_csv(path, dtype=text)
-    return table.astype({name: "Int64" for name in COUNT_COLUMNS if name in table})
 
 
 def _lost(table: pd.DataFrame) -> NDArray[np.float64]:

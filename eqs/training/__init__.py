@@ -1,6 +1,7 @@
 """Training a detector: windows, batches, augmentation, and what one step does."""
 
 from eqs.training.augmentation import Augmentation, View
+from eqs.training.checkpoints import IDENTITY, CompleteCheckpoints, Identity
 from eqs.training.datamodule import EventDataModule, StepSampler
 from eqs.training.datasets import (
     Batch,
@@ -17,15 +18,18 @@ from eqs.training.selection import Selection, boxes_of
 from eqs.training.task import DetectionTask
 
 __all__ = [
+    "IDENTITY",
     "Augmentation",
     "Batch",
     "Binning",
     "Chunk",
+    "CompleteCheckpoints",
     "DetectionPictures",
     "DetectionTask",
     "EpochLines",
     "EvaluationDataset",
     "EventDataModule",
+    "Identity",
     "Schedule",
     "Selection",
     "StepSampler",

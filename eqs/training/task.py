@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from math import isfinite
 from typing import Any
 
 import lightning
@@ -22,8 +23,13 @@ from eqs.models import (
     gather_frames,
     reset_states,
 )
+from eqs.models.states import move_states, of_all_processes, of_this_process
+from eqs.models.synchronised import mean_over_processes
+from eqs.training.checkpoints import require_finite
 from eqs.training.datasets import Batch
 from eqs.training.selection import Selection
+
+PROGRESS = ("last_epoch", "_step_count", "_last_lr")  # of a schedule; the rest are its constants
 
 
 class DetectionTask(lightning.LightningModule):
@@ -76,9 +82,28 @@ class DetectionTask(lightning.LightningModule):
         self._train_states = detach_states(states)
         labelled = batch["labelled"]
         losses = self.model.loss(gather_frames(maps, labelled), batch["labels"][labelled])
+        self._require_finite(losses)
         self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
         self.log("loss", losses["loss"].detach(), prog_bar=True, logger=False)
         return losses["loss"]
+
+    def _require_finite(self, losses: dict[str, Tensor]) -> None:
+        """Stop all processes where one of them has nothing to learn from."""
+        finite = torch.isfinite(losses["loss"].detach())
+        if mean_over_processes(finite.float()) == 1:
+            return
+        terms = {name: float(value.detach()) for name, value in losses.items()}
+        broken = [f"{name} = {value}" for name, value in terms.items() if not isfinite(value)]
+        rate = self.trainer.optimizers[0].param_groups[0]["lr"]
+        raise ValueError(
+            f"Expected a finite loss, got {', '.join(broken) or 'another process without one'} at "
+            f"step {self.trainer.global_step} with a learning rate of {rate:.3g}; set "
+            "recipe.learning_rate lower or trainer.precision=32-true, last.ckpt is as it was"
+        )
+
+    def on_validation_epoch_start(self) -> None:
+        """Forget what an interrupted evaluation left."""
+        self._begin(self.val_precision)
 
     def validation_step(self, batch: Batch, batch_idx: int) -> None:
         """Collect detections on the stream the detector was trained on."""
@@ -87,6 +112,10 @@ class DetectionTask(lightning.LightningModule):
     def on_validation_epoch_end(self) -> None:
         """Log the mAP of the whole validation set."""
         self._finish("val", "val", self.val_precision)
+
+    def on_test_epoch_start(self) -> None:
+        """Forget what an interrupted evaluation left."""
+        self._begin(*self.test_precision)
 
     def test_step(self, batch: Batch, batch_idx: int, dataloader_idx: int = 0) -> None:
         """Collect detections on one of the test streams."""
@@ -112,6 +141,11 @@ class DetectionTask(lightning.LightningModule):
             return []
         predictions = self.model.detect(gather_frames(maps, labelled))
         return self.selection(predictions, batch["histograms"].shape[-1])
+
+    def _begin(self, *metrics: MeanAveragePrecision) -> None:
+        self._evaluation_states = None
+        for metric in metrics:
+            metric.reset()
 
     def _evaluate(self, batch: Batch, metric: MeanAveragePrecision) -> None:
         detections = self.detect(batch)
@@ -146,13 +180,28 @@ class DetectionTask(lightning.LightningModule):
         }
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Keep the recurrent states, so that a resumed run goes on where it stopped."""
-        checkpoint["train_states"] = self._train_states
+        """Keep the recurrent states of every process, so that a run goes on where it stopped.
+
+        Raises:
+            ValueError: a weight is not finite.
+        """
+        require_finite(checkpoint["state_dict"], checkpoint["global_step"])
+        checkpoint["train_states"] = of_all_processes(self._train_states)
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        """Take the recurrent states back."""
-        states = checkpoint.get("train_states")
+        """Take the recurrent states of this process back.
+
+        Convention: the schedule is the configured one, taken up at the step of the checkpoint. So
+        a training that goes on for longer than it was begun for follows the longer schedule from
+        that step on.
+        """
+        states = of_this_process(checkpoint.get("train_states"))
         self._train_states = move_states(states, self.device) if states is not None else None
+        if checkpoint.get("lr_schedulers"):
+            configured = self.make_scheduler(self.make_optimizer(self.model.parameters()))
+            constants = configured.state_dict().items()
+            for schedule in checkpoint["lr_schedulers"]:
+                schedule |= {name: value for name, value in constants if name not in PROGRESS}
 
 
 def ground_truth(rows: Tensor) -> dict[str, Tensor]:
@@ -160,8 +209,3 @@ def ground_truth(rows: Tensor) -> dict[str, Tensor]:
     rows = rows[rows[:, 3] > 0].float()
     centre, half = rows[:, 1:3], rows[:, 3:5] / 2
     return {"boxes": torch.cat([centre - half, centre + half], dim=1), "labels": rows[:, 0].long()}
-
-
-def move_states(states: States, device: torch.device) -> States:
-    """Recurrent states on another device."""
-    return [(hidden.to(device), cell.to(device)) for hidden, cell in states]

@@ -25,6 +25,7 @@ def result_of(simulator: str, **changed: object) -> RunResult:
         "system": simulator,
         "seed": 0,
         "recipe": "old",
+        "data": "then",
         "own": accuracy,
         "real": accuracy,
         "protocol": {"name": "coco", "hash": "0"},

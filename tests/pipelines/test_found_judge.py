@@ -10,15 +10,18 @@ from hydra import compose, initialize_config_dir
 
 from eqs.metrics import EventQualityScore, Judge
 from eqs.models import RVTDetector
-from eqs.pipelines import judge
+from eqs.pipelines import judge, scoring
 from eqs.pipelines.build import dataset
-from eqs.pipelines.runs import Run, recipe_hash
+from eqs.pipelines.recipe import recipe_hash
+from eqs.pipelines.resolvers import register_resolvers
+from eqs.pipelines.runs import Run
 
 CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 
 
 @pytest.fixture
 def cfg(tmp_path):
+    register_resolvers()
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         return compose("evaluate", [f"paths.runs={tmp_path}"])
 
@@ -75,7 +78,7 @@ def test_whitened_readings_appear_when_asked_for(features, expected, make_events
     recording = make_events(3000, 32, 32)
     trained = Judge.random(size="tiny").centred_on([recording], ["hidden", "gate"])
     metric = EventQualityScore(trained, features=features)
-    readings = judge.readings_of(metric, ["hidden", "gate"])
+    readings = scoring.readings_of(metric, ["hidden", "gate"])
     assert [reading.name for reading in readings] == expected.split()
 
 
@@ -84,13 +87,13 @@ def test_a_given_folder_is_the_judge(tmp_path, make_events):
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose("evaluate", [f"eqs.judge={tmp_path / 'mine'}", f"paths.runs={tmp_path}"])
         gate = compose("evaluate", [f"eqs.judge={tmp_path / 'mine'}", "eqs.tap=gate"])
-    found = judge.find_scoring(cfg, None)
+    found = scoring.find_scoring(cfg, None)
     assert found.headline.name == "hidden_centred"
     assert found.judge.weights_sha256 == Judge.load(tmp_path / "mine").weights_sha256
     names = {reading.name for reading in found.readings}
     assert names == {"hidden_centred", "hidden_raw", "gate_raw", "downsample_raw"}
     with pytest.raises(ValueError, match=r"centre of the activation gate.* set eqs\.judge, or"):
-        judge.find_scoring(gate, None)
+        scoring.find_scoring(gate, None)
 
 
 def test_a_checkpoint_is_centred_on_the_training_recordings_and_kept(tmp_path, make_recording):
@@ -111,9 +114,9 @@ def test_a_checkpoint_is_centred_on_the_training_recordings_and_kept(tmp_path, m
     ]
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose("evaluate", given)
-    found = judge.find_scoring(cfg, dataset(cfg))
+    found = scoring.find_scoring(cfg, dataset(cfg))
     (kept,) = (tmp_path / "results" / "dsec").glob("judge-*")
     assert Judge.load(kept).reading().centre.sha256 == found.headline.centre.sha256
     shutil.rmtree(tmp_path / "data" / "train")
-    again = judge.find_scoring(cfg, None)
+    again = scoring.find_scoring(cfg, None)
     assert again.headline.centre.sha256 == found.headline.centre.sha256

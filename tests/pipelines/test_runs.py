@@ -12,8 +12,9 @@ from omegaconf import DictConfig, OmegaConf
 import eqs
 from eqs.pipelines.command import explained
 from eqs.pipelines.evaluate import short_names
+from eqs.pipelines.recipe import recipe_hash
 from eqs.pipelines.resolvers import register_resolvers
-from eqs.pipelines.runs import Run, finished_runs, recipe_hash
+from eqs.pipelines.runs import Run, finished_runs
 from eqs.pipelines.timing import PhaseTimes
 
 CONFIGS = Path(eqs.__file__).parent / "configs"
@@ -81,10 +82,12 @@ def test_a_result_is_read_as_it_was_written_and_named_where_it_lacks_something(
 
 def test_only_finished_runs_are_found(tmp_path: Path, result_of) -> None:
     done, begun = Run(tmp_path / "esim-1" / "a-seed0"), Run(tmp_path / "esim-1" / "a-seed1")
-    begun.save_config(OmegaConf.create({"seed": 1}))
+    begun.save_config(OmegaConf.create({"seed": 1}), {"recipe.epochs": 3})
     done.finish(result_of("esim"))
     assert [run.folder for run in finished_runs(tmp_path)] == [done.folder]
     assert begun.config().seed == 1
+    assert begun.recipe() == {"recipe.epochs": 3}
+    assert done.recipe() == {}
     assert not begun.finished
 
 

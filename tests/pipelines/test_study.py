@@ -23,11 +23,12 @@ from eqs.metrics import Definition, Judge
 from eqs.pipelines.build import dataset
 from eqs.pipelines.detections import detections_over
 from eqs.pipelines.evaluate import evaluate
-from eqs.pipelines.judge import KEPT_TAPS, find_scoring
+from eqs.pipelines.judge import KEPT_TAPS
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.pipelines.result import RunResult
 from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import Run, finished_runs
+from eqs.pipelines.scoring import find_scoring
 from eqs.pipelines.train import build_task, train
 from eqs.training import Binning, EvaluationDataset, WindowSource
 
@@ -117,7 +118,7 @@ def test_a_finished_run_is_not_repeated(place: Path, trained: dict[str, RunResul
 def test_an_interrupted_run_ends_with_the_same_numbers(
     place: Path, trained: dict[str, RunResult], kind: type[Callback]
 ) -> None:
-    elsewhere = [f"paths.runs={place / kind.__name__}", "sim=esim", "ckpt_path=last"]
+    elsewhere = [f"paths.runs={place / kind.__name__}", "sim=esim"]
     elsewhere += ["recipe.validate_every_epochs=2"]  # when it validates may change nothing
     cut, again = (configured(place, *elsewhere) for _ in range(2))
     with open_dict(cut), open_dict(again):

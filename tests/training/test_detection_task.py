@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
+from unittest.mock import patch
 
 import pytest
 import torch
 from torch.optim import SGD
-from torch.optim.lr_scheduler import ConstantLR
+from torch.optim.lr_scheduler import ConstantLR, OneCycleLR
 
 from eqs.data import LabelProtocol
 from eqs.models import RVTDetector
@@ -71,7 +73,7 @@ def test_a_first_sample_forgets_what_came_before(task: DetectionTask) -> None:
 
 def test_a_resumed_task_takes_its_states_back(task: DetectionTask) -> None:
     task.training_step(batch(), 0)
-    checkpoint: dict[str, object] = {}
+    checkpoint = {"state_dict": task.state_dict(), "global_step": 1}
     task.on_save_checkpoint(checkpoint)
     states, task._train_states = task._train_states, None
     task.on_load_checkpoint(checkpoint)
@@ -126,3 +128,61 @@ def test_detections_below_the_size_limits_drop_out_when_asked(task: DetectionTas
     keep = (sides >= 9.0).all(1)
     assert 0 < keep.sum() < len(keep)
     torch.testing.assert_close(large["boxes"], everything["boxes"][keep])
+
+
+def test_a_loss_that_is_not_finite_stops_and_says_where(task: DetectionTask) -> None:
+    rates = SimpleNamespace(optimizers=[SGD(task.parameters(), lr=0.125)], global_step=7)
+    with torch.no_grad():
+        task.model.yolox_head.obj_preds[0].bias.fill_(float("nan"))
+    with (
+        patch.object(DetectionTask, "trainer", rates),
+        pytest.raises(ValueError, match=r"loss = nan at step 7 .* rate of 0.125; set recipe"),
+    ):
+        task.training_step(batch(), 0)
+
+
+@pytest.mark.parametrize("broken", [float("nan"), float("inf")])
+def test_broken_weights_are_not_kept(task: DetectionTask, broken: float) -> None:
+    state = {name: value.clone() for name, value in task.state_dict().items()}
+    state["model.yolox_head.obj_preds.0.bias"][:] = broken
+    with pytest.raises(ValueError, match=r"finite weights after step 5, got NaN or infinity in mo"):
+        task.on_save_checkpoint({"state_dict": state, "global_step": 5})
+
+
+def test_an_interrupted_test_leaves_nothing_behind(task: DetectionTask) -> None:
+    task.eval()
+    with torch.no_grad():
+        task.on_test_epoch_start()
+        task.test_step(batch(), 0)  # and cut
+        task.on_test_epoch_start()
+        task.test_step(batch(), 0)
+        task.test_step(batch(), 0, 1)
+    task.on_test_epoch_end()
+    assert task.measured["own"] == task.measured["real"]
+
+
+def test_a_longer_training_takes_its_schedule_up_where_the_shorter_one_ended() -> None:
+    def optimiser_and_schedule(steps: int):
+        optimiser = SGD([torch.nn.Parameter(torch.zeros(1))], lr=0.1)
+        return optimiser, OneCycleLR(optimiser, max_lr=0.1, total_steps=steps)
+
+    def advance(optimiser, schedule, steps: int) -> None:
+        for _ in range(steps):
+            optimiser.step()
+            schedule.step()
+
+    model = RVTDetector("tiny", num_classes=2, in_channels=4, partition_split_32=1)
+    protocol = LabelProtocol(name="two", classes={"car": [2], "pedestrian": [0]})
+    schedule = partial(OneCycleLR, max_lr=0.1, total_steps=40)
+    task = DetectionTask(model, partial(SGD, lr=0.1), schedule, protocol)
+    optimiser, short = optimiser_and_schedule(20)
+    advance(optimiser, short, 20)
+    checkpoint = {"lr_schedulers": [short.state_dict()], "train_states": None}
+    task.on_load_checkpoint(checkpoint)
+    optimiser, going_on = optimiser_and_schedule(20)
+    going_on.load_state_dict(checkpoint["lr_schedulers"][0])
+    reference, long = optimiser_and_schedule(40)
+    advance(reference, long, 20)
+    advance(optimiser, going_on, 1)
+    advance(reference, long, 1)
+    assert optimiser.param_groups[0]["lr"] == pytest.approx(reference.param_groups[0]["lr"])

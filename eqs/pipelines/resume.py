@@ -1,0 +1,115 @@
+"""Where a training goes on: at its own newest checkpoint, a given one, or a shorter training's."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig, OmegaConf
+
+from eqs.models import RVTDetector
+from eqs.models.checkpoint import check_resumable
+from eqs.pipelines.recipe import differences, recipe
+from eqs.pipelines.runs import Run
+from eqs.training import IDENTITY
+
+log = logging.getLogger(__name__)
+LISTED = 4  # differences that a sentence names
+# What an identity says beside the recipe.
+NAMED_APART = ("stream", "data", "seed", "total_steps")
+
+
+def identity_of(cfg: DictConfig, stream: str, data: str) -> dict[str, Any]:
+    """What a checkpoint says of its training: stream, data, seed, steps and every setting."""
+    steps = cfg.recipe.epochs * cfg.recipe.steps_per_epoch
+    named = dict(zip(NAMED_APART, (stream, data, cfg.seed, steps), strict=True))
+    return {**named, **recipe(cfg)}
+
+
+def checkpoint_path(
+    cfg: DictConfig, run: Run, shorter: Run | None, identity: Mapping[str, Any], model: RVTDetector
+) -> Path | None:
+    """Where to go on, or None to begin; the checkpoint is one of this very training.
+
+    Args:
+        cfg: a training's configuration.
+        run: where its checkpoints lie.
+        shorter: the training that this one goes on from for longer, if it does.
+        identity: what its checkpoints say of it.
+        model: the detector that is trained.
+
+    Raises:
+        FileNotFoundError: the given checkpoint, or that of the shorter training, does not exist.
+        ValueError: the checkpoint belongs to another training, or is none.
+    """
+    own = run.last_checkpoint
+    if own.exists() and not cfg.overwrite and cfg.ckpt_path in (None, "last"):
+        compare(own, check_resumable(model, own), identity)
+        log.info("going on from %s; overwrite=true begins anew", own)
+        return own
+    if cfg.ckpt_path not in (None, "last"):
+        path = Path(cfg.ckpt_path)
+        if not path.is_file():
+            raise FileNotFoundError(f"Expected a checkpoint at {path}, found none; set ckpt_path")
+        compare(path, check_resumable(model, path), identity)
+        return path
+    if shorter is not None:
+        path = shorter.last_checkpoint
+        if not (shorter.finished and path.is_file()):
+            raise FileNotFoundError(
+                f"Expected the finished training of {cfg.recipe.extends_epochs} epochs at "
+                f"{shorter.folder}, found none; train it first, or set recipe.extends_epochs=null"
+            )
+        compare(path, check_resumable(model, path), identity_of_shorter(cfg, identity))
+        return path
+    return None
+
+
+def compare(path: Path, content: Mapping[str, Any], identity: Mapping[str, Any]) -> None:
+    """Refuse the checkpoint of another training.
+
+    Raises:
+        ValueError: stream, data, seed, steps or a setting differ, or nobody noted them.
+    """
+    stored = content.get(IDENTITY)
+    if stored is None:
+        raise ValueError(
+            f"Expected a checkpoint that says which training it belongs to, got {path} of an "
+            "older version; set overwrite=true to begin anew, or model.weights to start from it"
+        )
+    found = differences(stored, identity)
+    if found:
+        more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
+        raise ValueError(
+            f"Expected a checkpoint of this training in {path}, got one with "
+            f"{', '.join(found[:LISTED])}{more}; to go on set the same, to go on for longer set "
+            "recipe.extends_epochs, to start from its weights set model.weights"
+        )
+
+
+def shorter_config(cfg: DictConfig) -> DictConfig | None:
+    """The configuration of the training that is extended, if one is.
+
+    Raises:
+        ValueError: it is not shorter.
+    """
+    epochs = cfg.recipe.extends_epochs
+    if epochs is None:
+        return None
+    if not isinstance(epochs, int) or not 0 < epochs < cfg.recipe.epochs:
+        raise ValueError(
+            f"Expected a training of fewer than {cfg.recipe.epochs} epochs to extend, got "
+            f"{epochs!r}; set recipe.extends_epochs or recipe.epochs"
+        )
+    shorter = OmegaConf.merge(cfg, {"recipe": {"epochs": epochs, "extends_epochs": None}})
+    assert isinstance(shorter, DictConfig)
+    return shorter
+
+
+def identity_of_shorter(cfg: DictConfig, identity: Mapping[str, Any]) -> dict[str, Any]:
+    """What the checkpoints of the training that is extended say of it."""
+    shorter = shorter_config(cfg)
+    assert shorter is not None
+    return identity_of(shorter, identity["stream"], identity["data"])
