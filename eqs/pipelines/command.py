@@ -106,6 +106,8 @@ def quiet_libraries() -> None:
         ".*does not have many workers",  # windows are binned faster than a laptop trains
         ".*smaller than the logging interval",
         ".*exists and is not empty",  # as it should when a training is resumed
+        ".*It is recommended to use .*sync_dist=True",  # a mAP is that of all processes already
+        ".*The dirpath has changed",  # as it should when a training goes on for longer
     ):
         warnings.filterwarnings("ignore", message=message)
     for name in ("lightning.pytorch.utilities.rank_zero", "lightning.fabric.utilities.seed"):

@@ -61,7 +61,8 @@ def simulate_clip(simulator: Simulator, cfg: DictConfig) -> None:
     the same frames is kept, any other is left alone unless `overwrite` is set.
 
     Raises:
-        ValueError: something else is there already, a folder or the clip itself, or the clip is longer than a file can hold.
+        ValueError: something else is there already, a folder or the clip itself, or the clip is
+            longer than a file can hold.
     """
     out, source = Path(cfg.out), Path(cfg.frames)
     if out.is_dir():

@@ -9,10 +9,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import lightning
+from hydra.errors import InstantiationException
 from hydra.utils import instantiate
+from lightning.fabric.utilities.exceptions import MisconfigurationException
 from lightning.pytorch.callbacks import Callback, ModelCheckpoint
 from omegaconf import DictConfig
 
+from eqs.extras import needed
 from eqs.pipelines.command import Interrupted
 from eqs.pipelines.runs import Run
 from eqs.training import CompleteCheckpoints, Identity, SynchronisedNorms
@@ -25,7 +28,7 @@ def check_trainer(cfg: DictConfig) -> bool:
         Whether this is the first of the processes that train together.
 
     Raises:
-        InstantiationException: an accelerator or an optional package is not there.
+        ValueError: an accelerator or an optional package is not there.
     """
     with TemporaryDirectory() as nowhere:
         return bool(build_trainer(cfg, Run(Path(nowhere)), {}).is_global_zero)
@@ -55,12 +58,21 @@ def build_trainer(cfg: DictConfig, run: Run, identity: Mapping[str, Any]) -> lig
     )
     shown = instantiate(cfg.callbacks).values()
     callbacks: list[Callback] = [Identity(identity), last, best, *shown]
-    loggers = [logger(save_dir=run.folder) for logger in instantiate(cfg.logger).values()]
+    with needed("all", "to log"):
+        loggers = [logger(save_dir=run.folder) for logger in instantiate(cfg.logger).values()]
     # Norms over all processes, so that their number changes nothing.
     plugins = [CompleteCheckpoints(), SynchronisedNorms()]
-    trainer: lightning.Trainer = instantiate(
-        cfg.trainer, callbacks=callbacks, logger=loggers, plugins=plugins
-    )
+    try:
+        trainer: lightning.Trainer = instantiate(
+            cfg.trainer, callbacks=callbacks, logger=loggers, plugins=plugins
+        )
+    except InstantiationException as error:
+        if isinstance(error.__cause__, MisconfigurationException):
+            raise ValueError(
+                f"Expected a trainer that can run here, got: {error.__cause__}; set trainer=auto "
+                "or trainer=cpu, or what is wrong below trainer"
+            ) from error
+        raise
     return trainer
 
 

@@ -6,6 +6,7 @@ from torch import distributed, multiprocessing, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from eqs.models import RVTDetector, SyncBatchNorm
+from eqs.models.states import of_all_processes, of_this_process
 from eqs.models.synchronised import mean_over_processes
 
 PROCESSES = 2
@@ -89,3 +90,26 @@ def test_conversion_keeps_parameters_and_mode(training):
     assert after[1][0].training is training
     for name, value in after.state_dict().items():
         assert torch.equal(value, before[name])
+
+
+def keep_and_take_back(rank, file):
+    distributed.init_process_group(
+        "gloo", init_method=f"file://{file}", rank=rank, world_size=PROCESSES
+    )
+    own = [(torch.full((2, 3), 10.0 * rank), torch.full((2, 3), 10.0 * rank + 1))]
+    kept = of_all_processes(own)
+    torch.save((kept, of_this_process(kept)), f"{file}.{rank}.pt")
+    distributed.destroy_process_group()
+
+
+def test_every_process_s_states_are_kept_and_given_back(tmp_path):
+    multiprocessing.spawn(keep_and_take_back, (str(tmp_path / "meeting"),), nprocs=PROCESSES)
+    for rank in range(PROCESSES):
+        kept, own = torch.load(tmp_path / f"meeting.{rank}.pt")
+        ((hidden, cell),) = kept
+        assert hidden[:, 0].tolist() == [0, 0, 10, 10]
+        assert cell[:, 0].tolist() == [1, 1, 11, 11]
+        assert own[0][0].tolist() == [[10.0 * rank] * 3] * 2
+    # One process that goes on has the whole batch.
+    assert of_this_process(kept)[0][0].shape == (4, 3)
+    assert of_this_process(None) is of_all_processes(None) is None

@@ -122,8 +122,8 @@ def test_an_interrupted_run_ends_with_the_same_numbers(
     elsewhere += ["recipe.validate_every_epochs=2"]  # when it validates may change nothing
     cut, again = (configured(place, *elsewhere) for _ in range(2))
     with open_dict(cut), open_dict(again):
-        cut.callbacks = {"cut": {"_target_": f"{__name__}.{kind.__name__}"}}
-        again.callbacks = {"lines": {"_target_": "eqs.training.EpochLines", "label": "esim"}}
+        cut.callbacks = {"progress": {"_target_": f"{__name__}.{kind.__name__}"}}
+        again.callbacks = {"progress": {"_target_": "eqs.training.EpochLines", "label": "esim"}}
     with pytest.raises(Interrupted):
         train(cut)
     assert not list(finished_runs(place / kind.__name__ / "dsec_mini_smoke"))
