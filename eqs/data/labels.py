@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.data.matching import MatchedLabels, match_labels
+
 
 @dataclass(frozen=True, kw_only=True)
 class LabelProtocol:
@@ -33,6 +35,9 @@ class LabelProtocol:
         score_empty_frames: whether a frame without a box counts, as one that shows no object; if
             not, it drops out together with its detections.
         filter_detections: whether detections below the size limits drop out as labels do.
+        label_tolerance_us: largest distance between a label and the frame it belongs to; more is
+            another time, since things move.
+        least_matched_labels: share of a recording's label times that must belong to a frame.
         class_score: whether detections are ranked by their class confidence alone, instead of its
             product with the objectness.
 
@@ -57,6 +62,8 @@ class LabelProtocol:
     score_empty_frames: bool = True
     filter_detections: bool = False
     class_score: bool = False
+    label_tolerance_us: int = 5_000
+    least_matched_labels: float = 0.9
 
     def __post_init__(self) -> None:
         """Check the classes and sizes, and keep plain copies of configured containers."""
@@ -68,11 +75,27 @@ class LabelProtocol:
                 f"Expected classes that share no data set id, got {dict(self.classes)}; "
                 "set protocol.classes"
             )
+        if self.label_tolerance_us < 0 or not 0 <= self.least_matched_labels <= 1:
+            raise ValueError(
+                f"Expected a tolerance of zero or more and a share in [0, 1], got "
+                f"{self.label_tolerance_us} and {self.least_matched_labels}; set "
+                "protocol.label_tolerance_us and protocol.least_matched_labels"
+            )
         if min(self.min_side_px, self.min_diagonal_px) < 0:
             raise ValueError(
                 f"Expected sizes of zero or more, got {self.min_side_px} and "
                 f"{self.min_diagonal_px}; set protocol.min_side_px and protocol.min_diagonal_px"
             )
+
+    def match(
+        self, tracks: NDArray[Any] | None, frame_times_us: NDArray[np.int64]
+    ) -> MatchedLabels:
+        """The label rows of each frame; none where nothing was labelled."""
+        if tracks is None:
+            tracks = np.empty(
+                0, [(name, np.int64) for name in ("t", "x", "y", "w", "h", "class_id")]
+            )
+        return match_labels(tracks, frame_times_us, self.label_tolerance_us)
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -129,6 +152,7 @@ class LabelProtocol:
             "score_empty_frames": self.score_empty_frames,
             "filter_detections": self.filter_detections,
             "class_score": self.class_score,
+            "label_tolerance_us": self.label_tolerance_us,
         }
 
     @cached_property

@@ -26,6 +26,31 @@ def detection_windows(
     return np.stack([stops - window_us, stops], axis=1)
 
 
+def seen_between_frames(
+    frame_times_us: NDArray[np.int64], window_us: int = 50_000
+) -> tuple[float, str]:
+    """What windows that end at frames show of the time between them.
+
+    Returns:
+        Period of the frames by the length of the windows, and what follows from it in words, empty
+        where they are alike within a fiftieth.
+
+    Example:
+        >>> seen_between_frames(np.arange(5) * 100_000)
+        (2.0, 'frames are 100.0 ms apart and windows 50.0 ms long: 50 % of the events are not seen')
+        >>> seen_between_frames(np.arange(5) * 50_000)
+        (1.0, '')
+    """
+    period_us = float(np.median(np.diff(frame_times_us))) if len(frame_times_us) > 1 else window_us
+    ratio = period_us / window_us
+    lengths = f"frames are {period_us / 1e3:.1f} ms apart and windows {window_us / 1e3:.1f} ms long"
+    if ratio > 1.02:
+        return ratio, f"{lengths}: {100 * (1 - 1 / ratio):.0f} % of the events are not seen"
+    if ratio < 0.98:
+        return ratio, f"{lengths}: every event is seen {1 / ratio:.1f} times"
+    return ratio, ""
+
+
 def overlap_us(
     frame_times_us: NDArray[np.int64], events_start_us: int, events_stop_us: int
 ) -> tuple[int, int]:

@@ -51,7 +51,8 @@ class Showcase:
 
     def truth(self, protocol: LabelProtocol) -> Boxes:
         """The labelled boxes of the instant that count."""
-        rows = self.recording.tracks_at(self.stop_us)
+        matched = protocol.match(self.recording.tracks, self.recording.frame_times_us)
+        rows = matched.at(self.index)
         corners, labels = protocol.select(rows, self.recording.height, self.recording.width)
         return Boxes(corners=corners, labels=labels)
 

@@ -3,19 +3,14 @@
 from eqs.training.augmentation import Augmentation, View
 from eqs.training.checkpoints import IDENTITY, CompleteCheckpoints, Identity
 from eqs.training.datamodule import EventDataModule, StepSampler
-from eqs.training.datasets import (
-    Batch,
-    Binning,
-    EvaluationDataset,
-    TrainingDataset,
-    WindowSource,
-)
+from eqs.training.datasets import Batch, EvaluationDataset, TrainingDataset
 from eqs.training.layers import SynchronisedNorms
 from eqs.training.pictures import DetectionPictures
 from eqs.training.progress import EpochLines
 from eqs.training.sampling import Chunk, Schedule, keyed_generator
 from eqs.training.selection import Selection, boxes_of
 from eqs.training.task import DetectionTask
+from eqs.training.window_source import Binning, WindowSource
 
 __all__ = [
     "IDENTITY",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -11,15 +12,12 @@ from torch.utils.data import DataLoader, Sampler
 
 from eqs.data.labels import LabelProtocol
 from eqs.data.recording import Recording
+from eqs.events import EventReader
 from eqs.training.augmentation import Augmentation
-from eqs.training.datasets import (
-    Batch,
-    Binning,
-    EvaluationDataset,
-    TrainingDataset,
-    WindowSource,
-    check_boxes,
-)
+from eqs.training.datasets import Batch, EvaluationDataset, TrainingDataset
+from eqs.training.window_source import Binning, WindowSource, check_boxes, said_of
+
+log = logging.getLogger(__name__)
 
 
 class Splits(Protocol):
@@ -151,19 +149,24 @@ class EventDataModule(lightning.LightningDataModule):
     def prepare_data(self) -> None:
         """Open every event file before the first step, so that no fault waits for the last test.
 
+        It says what the detector will not see as one would think: labels that belong to no frame,
+        frames without events, and windows that are not as long as the frames are apart.
+
         Raises:
             FileNotFoundError: an event file is missing.
-            ValueError: an event file is damaged or runs on another clock than its frames, or the
-                test recordings have no boxes.
+            ValueError: an event file is damaged or runs on another clock than its frames, labels
+                belong to no frame, or the test recordings have no boxes.
         """
-        streams = [("train", self.source), ("val", self.source)]
-        streams += [("test", events) for events in self.tests.values()]
-        for split, events in streams:
+        streams = [("train", "train", self.source), ("val", "val", self.source)]
+        streams += [("test", f"test ({name})", events) for name, events in self.tests.items()]
+        for split, named, events in streams:
             sources = self.sources(split, events)
             for source in sources:
-                source.check_events()
+                source.check()
             if split == "test":
                 check_boxes(sources)
+            for sentence in said_of(sources):
+                log.warning("%s: %s", named, sentence)
 
     def training_dataset(self, rank: int = 0, world_size: int = 1) -> TrainingDataset:
         """The training batches of one process."""
@@ -204,9 +207,22 @@ class EventDataModule(lightning.LightningDataModule):
                 protocol=self.protocol,
                 binning=self.binning,
                 cache=self.histogram_cache,
+                span_us=self._span_of_tests(recording) if split == "test" else None,
             )
             for recording in self.dataset.recordings(split)
         ]
+
+    def _span_of_tests(self, recording: Recording) -> tuple[int, int] | None:
+        """The time that every test stream was watched, so that all count the same frames."""
+        size = recording.height, recording.width
+        extents = []
+        for events in self.tests.values():
+            with EventReader(events.path(recording), *size) as reader:
+                extents += [reader.extent_us] if reader.extent_us else []
+        if not extents:
+            return None
+        start = max(first for first, _ in extents)
+        return start, max(start, min(last for _, last in extents))
 
     def train_dataloader(self) -> DataLoader[Batch]:
         """The batches of one epoch."""

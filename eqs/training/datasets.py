@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
-from functools import cached_property, partial
-from pathlib import Path
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -13,139 +12,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from eqs.data.labels import LabelProtocol, detector_rows
-from eqs.data.recording import Recording
-from eqs.data.windows import detection_windows
-from eqs.events import EventReader
-from eqs.files import short_hash
-from eqs.representations import HISTOGRAM_VERSION, stacked_histogram
+from eqs.data.labels import detector_rows
 from eqs.training.augmentation import Augmentation, View, visible
-from eqs.training.histogram_cache import cached_histogram
 from eqs.training.sampling import Chunk, Schedule, keyed_generator
+from eqs.training.window_source import LabelledBoxes, WindowSource, check_sizes
 
 Batch = dict[str, Tensor]
-LabelledBoxes = tuple[NDArray[np.float32], NDArray[np.int64]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Binning:
-    """How a window of events becomes a histogram.
-
-    Args:
-        bins: time bins per polarity.
-        window_us: length of a window.
-        count_cutoff: a count stops growing here.
-    """
-
-    bins: int = 10
-    window_us: int = 50_000
-    count_cutoff: int = 10
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class WindowSource:
-    """One recording cut into the windows that end at its frames.
-
-    The event file is opened at the first use, in the process that uses it.
-
-    Args:
-        recording: frame times and labels.
-        events_path: the events to look at, recorded or simulated.
-        protocol: which boxes count.
-        binning: how windows become histograms.
-        cache: folder that keeps the histograms; None to bin the events at every use.
-    """
-
-    recording: Recording
-    events_path: Path
-    protocol: LabelProtocol
-    binning: Binning = field(default_factory=Binning)
-    cache: Path | None = None
-    windows_us: NDArray[np.int64] = field(init=False, repr=False)
-    reader: EventReader = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Derive the windows and prepare the reader."""
-        recording = self.recording
-        windows = detection_windows(recording.frame_times_us, self.binning.window_us)
-        reader = EventReader(
-            self.events_path,
-            recording.height,
-            recording.width,
-            rows=self.protocol.rows(recording.height),
-        )
-        object.__setattr__(self, "windows_us", windows)
-        object.__setattr__(self, "reader", reader)
-
-    def __len__(self) -> int:
-        """Number of windows."""
-        return len(self.windows_us)
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Channels, rows and columns of a histogram."""
-        rows = self.protocol.rows(self.recording.height)
-        return 2 * self.binning.bins, rows, self.recording.width
-
-    def histogram(self, index: int) -> NDArray[np.uint8]:
-        """The histogram of one window, uint8, shape `self.shape`."""
-        if self._kept is None:
-            return self._binned(index)
-        path = self._kept / f"{self.windows_us[index, 1]}.h5"
-        return cached_histogram(path, partial(self._binned, index), self.shape)
-
-    @cached_property
-    def _kept(self) -> Path | None:
-        """Where the histograms of these very events lie, binned this way."""
-        if self.cache is None:
-            return None
-        file = self.events_path.stat()
-        events = [str(self.events_path.resolve()), file.st_size, file.st_mtime_ns]
-        key = short_hash([HISTOGRAM_VERSION, events, asdict(self.binning), self.shape])
-        return self.cache / f"{self.recording.name}-{key}"
-
-    def _binned(self, index: int) -> NDArray[np.uint8]:
-        start_us, stop_us = (int(time) for time in self.windows_us[index])
-        return stacked_histogram(
-            self.reader.window(start_us, stop_us),
-            bins=self.binning.bins,
-            start_us=start_us,
-            stop_us=stop_us,
-            count_cutoff=self.binning.count_cutoff,
-        )
-
-    def check_events(self) -> None:
-        """Open the event file and see whether its events belong to the frames.
-
-        Raises:
-            FileNotFoundError: there is no such file.
-            ValueError: the file is damaged, or no event lies between the first and last frame.
-        """
-        if not len(self):
-            return
-        first, last = (int(time) for time in self.recording.frame_times_us[[0, -1]])
-        with self.reader as events:
-            apart = events.start_us > last or events.stop_us <= first
-            if len(events) and apart:
-                raise ValueError(
-                    f"Expected events and frames of one clock in {self.events_path}, got events "
-                    f"from {events.start_us} to {events.stop_us} us and frames from {first} to "
-                    f"{last} us; correct t_offset or the frames' times"
-                )
-
-    def boxes(self, index: int) -> LabelledBoxes:
-        """Boxes x1 y1 x2 y2 and classes at the end of one window."""
-        rows = self.recording.tracks_at(int(self.windows_us[index, 1]))
-        return self.protocol.select(rows, self.recording.height, self.recording.width)
-
-    def counts(self, boxes: NDArray[np.float32]) -> bool:
-        """Whether a frame with these boxes takes part in training and evaluation."""
-        return self.recording.has_labels and (self.protocol.score_empty_frames or len(boxes) > 0)
-
-    def labelled_windows(self) -> NDArray[np.int64]:
-        """Indices of the windows whose frames take part, int64."""
-        indices = [index for index in range(len(self)) if self.counts(self.boxes(index)[0])]
-        return np.array(indices, np.int64)
 
 
 @dataclass
@@ -233,7 +105,7 @@ class TrainingDataset(Dataset[Batch]):
         return Sample(
             histograms=histograms,
             labels=[detector_rows(*each) for each in boxes],
-            labelled=[source.counts(each) for each, _ in boxes],
+            labelled=[source.counts(i, each) for i, (each, _) in zip(indices, boxes, strict=True)],
         )
 
 
@@ -274,7 +146,7 @@ class EvaluationDataset(Dataset[Batch]):
         sample = Sample(
             histograms=np.stack([source.histogram(window) for window in range(start, stop)]),
             labels=[detector_rows(*each) for each in boxes],
-            labelled=[source.counts(each) for each, _ in boxes],
+            labelled=[source.counts(start + n, each) for n, (each, _) in enumerate(boxes)],
         )
         batch = collate([sample], stop - start)
         batch["first"] = torch.tensor([start == 0])
@@ -315,35 +187,3 @@ def collate(samples: Sequence[Sample], length: int) -> Batch:
         "labels": torch.from_numpy(labels),
         "labelled": torch.from_numpy(labelled),
     }
-
-
-def check_boxes(sources: Sequence[WindowSource]) -> None:
-    """Refuse recordings in which there is nothing to find, on which no detector can be tested.
-
-    Raises:
-        ValueError: no recording has a box that counts.
-    """
-    if not any(len(source.boxes(index)[0]) for source in sources for index in range(len(source))):
-        names = ", ".join(source.recording.name for source in sources)
-        raise ValueError(
-            f"Expected labelled boxes to test on, got none that counts in {names}; set data.root "
-            "or data.splits to labelled recordings, or protocol.classes and sizes to their boxes"
-        )
-
-
-def check_sizes(sources: Sequence[WindowSource]) -> None:
-    """Refuse recordings that cannot share a batch.
-
-    Raises:
-        ValueError: there is no recording with windows, or the recordings differ in size.
-    """
-    if not any(len(source) for source in sources):
-        raise ValueError(
-            "Expected recordings of two frames or more, got none; set data.root or data.splits"
-        )
-    sizes = {f"{source.shape[2]}x{source.shape[1]}" for source in sources}
-    if len(sizes) > 1:
-        raise ValueError(
-            f"Expected recordings of one size, got {', '.join(sorted(sizes))}; set data.splits to "
-            "recordings of one sensor"
-        )

@@ -69,7 +69,8 @@ def test_card_tells_everything_and_can_be_stored():
     one, other = protocol(min_side_px=5).card(), protocol(min_side_px=6).card()
     assert one != other
     assert json.loads(json.dumps(one)) == one
-    assert set(one) == {*LabelProtocol.__dataclass_fields__}
+    # The share that must belong to a frame refuses recordings and moves no number.
+    assert set(one) == {*LabelProtocol.__dataclass_fields__} - {"least_matched_labels"}
 
 
 def test_bad_protocols():
@@ -79,6 +80,10 @@ def test_bad_protocols():
         protocol(classes={})
     with pytest.raises(ValueError, match=r"zero or more, got -1 .*protocol\.min_side_px"):
         protocol(min_side_px=-1)
+    with pytest.raises(ValueError, match=r"got -1 and 0\.9; set protocol\.label_tolerance_us"):
+        protocol(label_tolerance_us=-1)
+    with pytest.raises(ValueError, match=r"got 5000 and 1\.5; .*protocol\.least_matched_labels"):
+        protocol(least_matched_labels=1.5)
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_stream_slot_shows_the_recordings_windows_and_labels(recordings):
                 events, 3, start_us=stop - 50_000, stop_us=stop, count_cutoff=10
             )
             np.testing.assert_array_equal(shown, expected)
-            tracks = recording.tracks_at(stop)
+            tracks = recording.tracks[recording.tracks["t"] == stop]
             rows = batch["labels"][time, 0]
             rows = rows[rows[:, 3] > 0]
             assert batch["labelled"][time, 0]
