@@ -16,13 +16,14 @@ from rich.console import Console
 from rich.progress import Progress
 from scipy import optimize
 
-from eqs.data import Recording, overlap_us
+from eqs.data import Recording
 from eqs.events import EventReader, Events
 from eqs.frames import FrameFolder
 from eqs.metrics.baselines import baselines
 from eqs.pipelines.build import dataset
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import Scoring, find_scoring
+from eqs.pipelines.score import recording_grid
 from eqs.simulators import Simulator
 from eqs.study import calibration_table, print_calibration, write_table
 
@@ -79,7 +80,7 @@ class Search:
 
 @dataclass(frozen=True)
 class Clip:
-    """Frames of a recording and the real events of the stretch of time that both cover."""
+    """Frames of a recording and the real events of the windows that are scored."""
 
     name: str
     frames: NDArray[Any]
@@ -89,13 +90,14 @@ class Clip:
     stop_us: int
 
     @classmethod
-    def of(cls, recording: Recording, rows: int | None) -> Clip:
+    def of(cls, recording: Recording, rows: int | None, window_us: int) -> Clip:
         """Read a recording into memory."""
         folder = FrameFolder(recording.frame_folder, recording.frame_times_us)
         frames = folder.read(0, len(folder))
         size = recording.height, recording.width
         with EventReader(recording.events_path, *size, rows=rows) as reader:
-            start, stop = overlap_us(recording.frame_times_us, reader.start_us, reader.stop_us)
+            grid = recording_grid(recording, reader, window_us)
+            start, stop = grid.start_us, grid.stop_us
             real = reader.window(start, stop)
         frames = frames[:, : real.height]
         return cls(recording.name, frames, recording.frame_times_us, real, start, stop)
@@ -126,7 +128,8 @@ class Clip:
             stop_us=self.stop_us,
             frame_times_us=self.times_us,
         )
-        ratio = len(events) / max(len(self.real), 1)
+        inside = events.window(self.start_us, self.stop_us)
+        ratio = len(inside) / max(len(self.real), 1)
         return {"eqs": self.score_events(scoring, events), "events_per_real_event": ratio, **values}
 
 
@@ -145,12 +148,13 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     data = dataset(cfg)
     scoring = find_scoring(cfg, data)
     train, test = (data.recordings(split) for split in ("train", "test"))
-    clips = [Clip.of(recording, data.crop_rows) for recording in train[: cfg.tune_on]]
+    shape = data.crop_rows, scoring.headline.definition.window_us
+    clips = [Clip.of(recording, *shape) for recording in train[: cfg.tune_on]]
     search = Search(scoring, simulator, ranges, clips)
     best = run(search, cfg.evaluations)
     measured: dict[str, list[dict[str, float]]] = {"before": [], "after": []}
     for recording in test:
-        clip = Clip.of(recording, data.crop_rows)
+        clip = Clip.of(recording, *shape)
         measured["before"].append(clip.measures(scoring, simulator))
         measured["after"].append(clip.measures(scoring, best))
     console, results = Console(), Path(cfg.paths.results) / cfg.data.name

@@ -12,13 +12,13 @@ from omegaconf import DictConfig
 from rich.console import Console
 from rich.progress import track
 
-from eqs.data import Recording, overlap_us
+from eqs.data import Recording
 from eqs.drawing import save_figure
 from eqs.events import EventReader, Events
 from eqs.metrics import EXPECTED_ORDER, GRADED, singles
 from eqs.pipelines.build import dataset
 from eqs.pipelines.judge import Scoring, find_scoring
-from eqs.pipelines.score import ANCHOR_US
+from eqs.pipelines.score import ANCHOR_US, recording_grid
 from eqs.study import print_sanity, sanity_figure, sanity_table, write_table
 
 AT_ONCE = 8  # streams of one pass of the judge
@@ -58,8 +58,8 @@ def damaged_scores(
             stack.enter_context(EventReader(each.events_path, each.height, each.width, rows=rows))
             for each in (recording, other)
         )
-        start, stop = overlap_us(recording.frame_times_us, real.start_us, real.stop_us)
-        stop = min(stop, start + ANCHOR_US)
+        grid = recording_grid(recording, real, scoring.headline.definition.window_us)
+        start, stop = grid.start_us, min(grid.stop_us, grid.start_us + ANCHOR_US)
         events = real.window(start, stop)
         lent = unrelated.window(unrelated.start_us, unrelated.start_us + ANCHOR_US)
     alike = (lent.height, lent.width) == (events.height, events.width)

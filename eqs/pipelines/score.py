@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
-from eqs.data import EventSource, Recording, overlap_us
-from eqs.events import EventReader
+from eqs.data import EventSource, Recording
+from eqs.events import EventReader, Events
 from eqs.metrics import EventQualityScore, anchors
 from eqs.metrics.baselines import FeatureFrechet, baselines
 from eqs.metrics.definition import choices
+from eqs.metrics.grid import Grid
+from eqs.metrics.windows import common_grid
 from eqs.names import BASELINE
 from eqs.pipelines.judge import Scoring
 
@@ -83,7 +85,8 @@ def score_recording(
     scores: Scores,
 ) -> None:
     """Add the scores of one recording; `other` lends the chance level."""
-    start, stop = overlap_us(recording.frame_times_us, real.start_us, real.stop_us)
+    grid = recording_grid(recording, real, scoring.headline.definition.window_us)
+    start, stop = grid.start_us, grid.stop_us
     candidates = list(streams.values())
     frechet = FeatureFrechet(scoring.headline.definition.tap)
     found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
@@ -102,6 +105,8 @@ def score_recording(
         "sequence": recording.name,
         "eqs_chance": known.get("chance", {}).get(scoring.headline.name, np.nan),
         "eqs_ceiling": known["ceiling"][scoring.headline.name],
+        "start_us": start,
+        "stop_us": stop,
         "n_events_real": len(real.window(start, stop)),
         "definition": scoring.headline.definition.hash,
         "weights_sha256": scoring.judge.weights_sha256,
@@ -128,6 +133,25 @@ def score_recording(
     scores.anchors += [
         {"sequence": recording.name, "anchor": name, **values} for name, values in known.items()
     ]
+
+
+def recording_grid(recording: Recording, real: EventReader, window_us: int) -> Grid:
+    """The windows of a recording: those of its real events and a clip as long as its frames.
+
+    It is what two files of that recording are compared over, too: whatever is simulated from
+    these frames states their time as its span.
+
+    Raises:
+        ValueError: there are no frames, or they share no whole window with the real events.
+    """
+    times = recording.frame_times_us
+    if not len(times):
+        raise ValueError(
+            "Expected frames that say which time is scored, got none; add images/timestamps.txt"
+        )
+    silence = Events.empty(real.height, real.width)
+    clip = replace(silence, span_us=(int(times[0]), int(times[-1])))
+    return common_grid([real, clip], window_us)
 
 
 def untrained_scores(

@@ -15,12 +15,19 @@ from rich.table import Table
 from eqs.events import EventReader
 from eqs.extras import DISTRIBUTION
 from eqs.files import write_json
-from eqs.metrics import StreamScore, window_starts
+from eqs.metrics import StreamScore
+from eqs.metrics.grid import Grid
+from eqs.metrics.windows import common_grid
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import score_anchors
 
 log = logging.getLogger(__name__)
+
+UNKNOWN_SPAN = (
+    "%s does not say from when to when its camera was watching, so the extent of the real file is "
+    "scored; if the frames cover less, a study scores less: set start_us and stop_us to theirs"
+)
 
 
 @explained
@@ -33,13 +40,13 @@ def score_files(cfg: DictConfig) -> None:
     """
     scoring = find_scoring(cfg, None)
     headline = scoring.headline.definition
-    size = (cfg.height, cfg.width)
+    size = (cfg.height, cfg.width, cfg.rows)
     with (
         EventReader(cfg.real, *size) as real,
         EventReader(cfg.simulated, *size) as simulated,
     ):
-        starts = window_starts([real, simulated], headline.window_us, cfg.start_us, cfg.stop_us)
-        span = int(starts[0]), int(starts[-1]) + headline.window_us
+        grid = common_grid([real, simulated], headline.window_us, cfg.start_us, cfg.stop_us)
+        span = grid.start_us, grid.stop_us
         (found,) = scoring.score(real, [simulated], start_us=span[0], stop_us=span[1])
         known = score_anchors(scoring, real, *span)
         counts = {
@@ -47,6 +54,7 @@ def score_files(cfg: DictConfig) -> None:
             "real": len(real.window(*span)),
         }
         height, width = real.height, real.width
+        watched = simulated.span_us
     scores = {name: score.score for name, score in found.items()}
     result, out = found[scoring.headline.name], Path(cfg.out)
     write_json(
@@ -60,13 +68,20 @@ def score_files(cfg: DictConfig) -> None:
             "anchors": known,
             "span_us": list(span),
             "windows": result.n_windows,
+            "share": grid.share,
+            "simulated_span_us": None if watched is None else list(watched),
+            "sensor": [height, width],
             "events": counts,
             "definition": headline.hash,
             "weights_sha256": scoring.judge.weights_sha256,
         },
     )
     write_curve(out / "curve.csv", result, span[0], headline.window_us)
-    show(scores, known, counts, scoring, Console())
+    console = Console()
+    show(scores, known, counts, scoring, console)
+    console.print(extent_line(grid, result))
+    if watched is None and (cfg.start_us is None or cfg.stop_us is None):
+        log.warning(UNKNOWN_SPAN, cfg.simulated)
     ceiling = known["ceiling"][scoring.headline.name]
     if find_spec("matplotlib") is None:
         log.info("no figures: they take pip install '%s[report]'", DISTRIBUTION)
@@ -97,6 +112,15 @@ def draw(
     save_figure(drawn, out, "map")
     curve = score_curve(score.curve, warmup=score.warmup, window_us=window_us, ceiling=ceiling)
     save_figure(curve, out, "curve")
+
+
+def extent_line(grid: Grid, score: StreamScore) -> str:
+    """What was scored, in a line: the span, its windows, its share of the real file."""
+    share = "an unknown share" if grid.share is None else f"{100 * grid.share:.1f} %"
+    return (
+        f"scored from {grid.start_us} us to {grid.stop_us} us, {share} of the real file: "
+        f"{grid.count} windows, of which {score.n_windows} count after the warm-up"
+    )
 
 
 def show(
