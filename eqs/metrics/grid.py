@@ -43,3 +43,16 @@ class Grid:
         first, last = self.extent_us
         inside = min(self.stop_us, last) - max(self.start_us, first)
         return max(inside, 0) / (last - first)
+
+
+def fewest_windows(warmup_windows: int) -> int:
+    """Below so many windows that count a score says little, and a command says so.
+
+    Convention: as many as the warm-up asks for, since so many it takes a state to settle and a
+    stream that has fewer left had its warm-up cut short; never a single one.
+
+    Example:
+        >>> fewest_windows(20), fewest_windows(0)
+        (20, 2)
+    """
+    return max(warmup_windows, 2)

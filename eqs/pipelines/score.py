@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -59,7 +59,7 @@ def score_recordings(
     """
     scores = Scores()
     for index, recording in enumerate(track(recordings, description="scoring")):
-        other = recordings[(index + 1) % len(recordings)]
+        other = partner(recording, [*recordings[index + 1 :], *recordings[:index]], rows)
         with ExitStack() as stack:
 
             def opened(recording: Recording, path: Path) -> EventReader:
@@ -68,12 +68,29 @@ def score_recordings(
 
             real = opened(recording, recording.events_path)
             streams = {name: opened(recording, s.path(recording)) for name, s in systems.items()}
-            unrelated = opened(other, other.events_path) if other is not recording else None
+            unrelated = opened(other, other.events_path) if other is not None else None
             try:
                 score_recording(scoring, recording, real, streams, unrelated, scores)
             except ValueError as error:
                 raise ValueError(f"{recording.name}: {error}") from error
     return scores
+
+
+def partner(
+    recording: Recording, others: Iterable[Recording], rows: int | None = None
+) -> Recording | None:
+    """The first other recording of the same sensor size, which lends the chance level.
+
+    Args:
+        recording: the recording that is scored.
+        others: the others, the preferred one first.
+        rows: rows from the top that are looked at; all of them if None.
+    """
+
+    def size(each: Recording) -> tuple[int, int]:
+        return each.height if rows is None else min(rows, each.height), each.width
+
+    return next((other for other in others if size(other) == size(recording)), None)
 
 
 def score_recording(
@@ -84,20 +101,19 @@ def score_recording(
     other: EventReader | None,
     scores: Scores,
 ) -> None:
-    """Add the scores of one recording; `other` lends the chance level."""
+    """Add the scores of one recording; `other`, of the same size, lends the chance level."""
     grid = recording_grid(recording, real, scoring.headline.definition.window_us)
     start, stop = grid.start_us, grid.stop_us
     candidates = list(streams.values())
     frechet = FeatureFrechet(scoring.headline.definition.tap)
     found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
     untrained = untrained_scores(scoring, real, candidates, start, stop)
-    alike = other is not None and (other.height, other.width) == (real.height, real.width)
     known = score_anchors(
         scoring,
         real,
         start,
         stop,
-        other=other if alike else None,
+        other=other,
         frame_times_us=recording.frame_times_us,
         key=recording.name,
     )
@@ -193,6 +209,11 @@ def score_baselines(
     return {f"{BASELINE}{name}": value for name, value in found.items()}
 
 
+def first_events(reader: EventReader) -> Events:
+    """The first quarter minute of a recording's events."""
+    return reader.window(reader.start_us, reader.start_us + ANCHOR_US)
+
+
 def score_anchors(
     scoring: Scoring,
     real: EventReader,
@@ -208,7 +229,7 @@ def score_anchors(
     events = real.window(start_us, stop_us)
     streams = anchors(
         events,
-        other=None if other is None else other.window(other.start_us, other.start_us + ANCHOR_US),
+        other=None if other is None else first_events(other),
         frame_times_us=frame_times_us,
         window_us=scoring.headline.definition.window_us,
         start_us=start_us,
