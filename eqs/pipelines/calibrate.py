@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,13 +21,16 @@ from eqs.data import Recording
 from eqs.events import EventReader, Events
 from eqs.frames import FrameFolder
 from eqs.metrics.baselines import baselines
+from eqs.metrics.grid import fewest_windows
 from eqs.pipelines.build import dataset
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import Scoring, find_scoring
 from eqs.pipelines.score import recording_grid
 from eqs.simulators import Simulator
 from eqs.study import calibration_table, print_calibration, write_table
+from eqs.study.notes import few_windows
 
+log = logging.getLogger(__name__)
 FIRST_STEP = 0.7  # of the search, in natural-log units: a factor of two
 
 
@@ -102,6 +106,12 @@ class Clip:
         frames = frames[:, : real.height]
         return cls(recording.name, frames, recording.frame_times_us, real, start, stop)
 
+    def windows(self, scoring: Scoring) -> int:
+        """The number of windows that count."""
+        definition = scoring.headline.definition
+        cut = (self.stop_us - self.start_us) // definition.window_us
+        return cut - definition.warmup_of(cut)
+
     def simulated(self, simulator: Simulator) -> Events:
         """What a simulator makes of the frames."""
         return simulator.simulate(self.frames, self.times_us, self.name)
@@ -150,11 +160,13 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     train, test = (data.recordings(split) for split in ("train", "test"))
     shape = data.crop_rows, scoring.headline.definition.window_us
     clips = [Clip.of(recording, *shape) for recording in train[: cfg.tune_on]]
+    counted = {clip.name: clip.windows(scoring) for clip in clips}
     search = Search(scoring, simulator, ranges, clips)
     best = run(search, cfg.evaluations)
     measured: dict[str, list[dict[str, float]]] = {"before": [], "after": []}
     for recording in test:
         clip = Clip.of(recording, *shape)
+        counted[clip.name] = clip.windows(scoring)
         measured["before"].append(clip.measures(scoring, simulator))
         measured["after"].append(clip.measures(scoring, best))
     console, results = Console(), Path(cfg.paths.results) / cfg.data.name
@@ -162,6 +174,9 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     values = {each.parameters[0]: getattr(best, each.parameters[0]) for each in ranges}
     before = {name: getattr(simulator, name) for name in values}
     print_calibration(calibration_table(measured), before, values, console)
+    fewest = fewest_windows(scoring.headline.definition.warmup_windows)
+    if few := few_windows(counted, fewest):
+        log.warning("%s", few)
     return values
 
 

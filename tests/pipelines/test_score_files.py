@@ -179,3 +179,11 @@ def test_rows_leave_out_what_lies_below(files, tmp_path):
     assert found["sensor"] == [32, 96]
     assert found["eqs"] == pytest.approx(1.0, abs=1e-6)
     assert result(tmp_path / "top.h5", files[0], tmp_path / "all", *limits)["eqs"] < 0.999
+
+
+def test_few_windows_are_named(files, tmp_path, caplog):
+    result(files[1], files[0], tmp_path / "out", "start_us=0", "stop_us=1000000")
+    assert "Few windows count (15): a score of fewer than 20 says little" in caplog.text
+    caplog.clear()
+    result(files[1], files[0], tmp_path / "whole", "start_us=0", "stop_us=2000000")
+    assert "Few windows" not in caplog.text
