@@ -108,25 +108,11 @@ def score_recording(
     frechet = FeatureFrechet(scoring.headline.definition.tap)
     found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
     untrained = untrained_scores(scoring, real, candidates, start, stop)
+    frames = recording.frame_times_us
     known = score_anchors(
-        scoring,
-        real,
-        start,
-        stop,
-        other=other,
-        frame_times_us=recording.frame_times_us,
-        key=recording.name,
+        scoring, real, start, stop, other=other, frame_times_us=frames, key=recording.name
     )
-    shared = {
-        "sequence": recording.name,
-        "eqs_chance": known.get("chance", {}).get(scoring.headline.name, np.nan),
-        "eqs_ceiling": known["ceiling"][scoring.headline.name],
-        "start_us": start,
-        "stop_us": stop,
-        "n_events_real": len(real.window(start, stop)),
-        "definition": scoring.headline.definition.hash,
-        "weights_sha256": scoring.judge.weights_sha256,
-    }
+    shared = shared_columns(scoring, recording, real, grid, known)
     for (name, stream), by_reading, without, distance in zip(
         streams.items(), found, untrained, frechet.values(), strict=True
     ):
@@ -139,7 +125,7 @@ def score_recording(
                 **shared,
                 "eqs": headline.score,
                 **{f"eqs_{reading}": score.score for reading, score in by_reading.items()},
-                **score_baselines(scoring, stream, real, start, stop, recording.frame_times_us),
+                **score_baselines(scoring, stream, real, start, stop, frames),
                 f"{BASELINE}untrained_eqs": without,
                 f"{BASELINE}frechet_distance": distance,
                 "n_windows": headline.n_windows,
@@ -149,6 +135,26 @@ def score_recording(
     scores.anchors += [
         {"sequence": recording.name, "anchor": name, **values} for name, values in known.items()
     ]
+
+
+def shared_columns(
+    scoring: Scoring,
+    recording: Recording,
+    real: EventReader,
+    grid: Grid,
+    known: Mapping[str, Mapping[str, float]],
+) -> dict[str, Any]:
+    """The columns of `eqs.csv` that are the same for every system."""
+    return {
+        "sequence": recording.name,
+        "eqs_chance": known.get("chance", {}).get(scoring.headline.name, np.nan),
+        "eqs_ceiling": known["ceiling"][scoring.headline.name],
+        "start_us": grid.start_us,
+        "stop_us": grid.stop_us,
+        "n_events_real": len(real.window(grid.start_us, grid.stop_us)),
+        "definition": scoring.headline.definition.hash,
+        "weights_sha256": scoring.judge.weights_sha256,
+    }
 
 
 def recording_grid(recording: Recording, real: EventReader, window_us: int) -> Grid:
