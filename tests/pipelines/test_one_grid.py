@@ -66,6 +66,7 @@ def simulated(folder, make_events):
     write_stream(V2E(), "a", frames, path)
     with EventReader(path) as reader:
         late = replace(reader.window(1_500_000, LAST), span_us=reader.span_us)
+    assert len(late)
     late.save(path)
     return path
 
