@@ -4,7 +4,7 @@ from eqs.data.dsec import DSECFolder, RecordingFolder, parse_size
 from eqs.data.labels import LabelProtocol, detector_rows
 from eqs.data.recording import Recording
 from eqs.data.simulated import EventSource, RecordedEvents, SimulatedEvents
-from eqs.data.windows import detection_windows, overlap_us, seen_between_frames
+from eqs.data.windows import detection_windows, seen_between_frames
 
 __all__ = [
     "DSECFolder",
@@ -16,7 +16,6 @@ __all__ = [
     "SimulatedEvents",
     "detection_windows",
     "detector_rows",
-    "overlap_us",
     "parse_size",
     "seen_between_frames",
 ]

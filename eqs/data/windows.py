@@ -49,16 +49,3 @@ def seen_between_frames(
     if ratio < 0.98:
         return ratio, f"{lengths}: every event is seen {1 / ratio:.1f} times"
     return ratio, ""
-
-
-def overlap_us(
-    frame_times_us: NDArray[np.int64], events_start_us: int, events_stop_us: int
-) -> tuple[int, int]:
-    """The stretch that both frames and events cover; empty (stop = start) where they do not meet.
-
-    The first frame may precede the first event and the last may follow the last one.
-    """
-    if len(frame_times_us) == 0:
-        return events_start_us, events_start_us
-    start = max(int(frame_times_us[0]), events_start_us)
-    return start, max(start, min(int(frame_times_us[-1]), events_stop_us))

@@ -76,7 +76,10 @@ def anchors(
         ValueError: the real stream is empty, or the other one is.
     """
     if not len(real):
-        raise ValueError("Expected a real stream with events to make anchors of, got an empty one")
+        raise ValueError(
+            "Expected a real stream with events to make anchors of, got an empty one; give one "
+            "that has some, or another time with start_us and stop_us"
+        )
     start = int(real.t[0]) if start_us is None else start_us
     stop = int(real.t[-1]) + 1 if stop_us is None else stop_us
     made = {

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from eqs.events import EventReader, Events
 from eqs.metrics.definition import Definition
+from eqs.metrics.grid import Grid
 from eqs.representations import stacked_histogram
 
 # Pixels of all frames in one pass of the backbone. Eight 640x480 frames keep the first stage's
@@ -41,13 +42,13 @@ def check_sensors(streams: Sequence[EventStream]) -> None:
         )
 
 
-def window_starts(
+def common_grid(
     streams: Sequence[EventStream],
     window_us: int,
     start_us: int | None = None,
     stop_us: int | None = None,
-) -> NDArray[np.int64]:
-    """Start times of the consecutive full windows in which streams are compared.
+) -> Grid:
+    """The windows in which streams are compared, by the one rule of every command.
 
     Convention: the reference sets the limits, with its span or else its first and last event, and a
     candidate narrows them only where it states a span of its own. So a simulator that fires late,
@@ -65,20 +66,14 @@ def window_starts(
         ValueError: the streams do not overlap in time, the overlap is shorter than one window, or
             no stream has events and a limit is missing.
     """
-    reference, *candidates = streams
-    stated = [reference.extent_us, *(stream.span_us for stream in candidates)]
-    extents = [extent for extent in stated if extent is not None]
-    extents = extents or [each.extent_us for each in candidates if each.extent_us is not None]
-    if not extents and (start_us is None or stop_us is None):
+    found = _limits(streams, given=start_us is not None or stop_us is not None)
+    if found is None and (start_us is None or stop_us is None):
         raise ValueError(
             "Expected events in at least one stream, got none; give start_us and stop_us"
         )
-    start = max(first for first, _ in extents) if start_us is None else start_us
-    stop = min(last for _, last in extents) if stop_us is None else stop_us
-    if start_us is None and stop_us is None:  # who names neither relies on a common clock
-        for first, last in filter(None, (each.extent_us for each in candidates)):
-            if first >= stop or last <= start:
-                start, stop = max(start, first), min(stop, last)
+    first, last = found or (0, 0)
+    start = first if start_us is None else start_us
+    stop = last if stop_us is None else stop_us
     if stop <= start:
         raise ValueError(
             f"Expected streams that overlap in time, got a common stretch from {start} us to "
@@ -90,7 +85,37 @@ def window_starts(
             f"Expected at least one window of {window_us} us, got an overlap of {stop - start} us; "
             "give longer streams or set eqs.window_us"
         )
-    return start + window_us * np.arange(count, dtype=np.int64)
+    return Grid(start_us=start, window_us=window_us, count=count, extent_us=streams[0].extent_us)
+
+
+def _limits(streams: Sequence[EventStream], given: bool) -> tuple[int, int] | None:
+    """Start and stop of what the streams share; stop before start where they do not meet.
+
+    Events tell the clock of a candidate that states no span: it meets the others or is on another
+    clock. Whoever names a limit, `given`, relies on a common clock, as a stated span does.
+    """
+    reference, *candidates = streams
+    events = [each.extent_us for each in candidates if each.span_us is None]
+    unstated = [extent for extent in events if extent is not None]
+    stated = [reference.extent_us, *(each.span_us for each in candidates)]
+    extents = [extent for extent in stated if extent is not None] or unstated
+    if not extents:
+        return None
+    start, stop = max(first for first, _ in extents), min(last for _, last in extents)
+    for first, last in unstated:
+        if not given and (first >= stop or last <= start):
+            start, stop = max(start, first), min(stop, last)
+    return start, stop
+
+
+def window_starts(
+    streams: Sequence[EventStream],
+    window_us: int,
+    start_us: int | None = None,
+    stop_us: int | None = None,
+) -> NDArray[np.int64]:
+    """Start times of the windows of `common_grid`, whose arguments and errors these are."""
+    return common_grid(streams, window_us, start_us, stop_us).starts_us
 
 
 def chunk_length(streams: int, height: int, width: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,16 +17,21 @@ from rich.console import Console
 from rich.progress import Progress
 from scipy import optimize
 
-from eqs.data import Recording, overlap_us
+from eqs.data import Recording
 from eqs.events import EventReader, Events
 from eqs.frames import FrameFolder
 from eqs.metrics.baselines import baselines
+from eqs.metrics.grid import fewest_windows
 from eqs.pipelines.build import dataset
 from eqs.pipelines.command import explained
+from eqs.pipelines.judge import require_judge
+from eqs.pipelines.score import recording_grid
 from eqs.pipelines.scoring import Scoring, find_scoring
 from eqs.simulators import Simulator
 from eqs.study import calibration_table, print_calibration, write_table
+from eqs.study.notes import few_windows
 
+log = logging.getLogger(__name__)
 FIRST_STEP = 0.7  # of the search, in natural-log units: a factor of two
 
 
@@ -79,7 +85,7 @@ class Search:
 
 @dataclass(frozen=True)
 class Clip:
-    """Frames of a recording and the real events of the stretch of time that both cover."""
+    """Frames of a recording and the real events of the windows that are scored."""
 
     name: str
     frames: NDArray[Any]
@@ -89,16 +95,23 @@ class Clip:
     stop_us: int
 
     @classmethod
-    def of(cls, recording: Recording, rows: int | None) -> Clip:
+    def of(cls, recording: Recording, rows: int | None, window_us: int) -> Clip:
         """Read a recording into memory."""
         folder = FrameFolder(recording.frame_folder, recording.frame_times_us)
         frames = folder.read(0, len(folder))
         size = recording.height, recording.width
         with EventReader(recording.events_path, *size, rows=rows) as reader:
-            start, stop = overlap_us(recording.frame_times_us, reader.start_us, reader.stop_us)
+            grid = recording_grid(recording, reader, window_us)
+            start, stop = grid.start_us, grid.stop_us
             real = reader.window(start, stop)
         frames = frames[:, : real.height]
         return cls(recording.name, frames, recording.frame_times_us, real, start, stop)
+
+    def windows(self, scoring: Scoring) -> int:
+        """The number of windows that count."""
+        definition = scoring.headline.definition
+        cut = (self.stop_us - self.start_us) // definition.window_us
+        return cut - definition.warmup_of(cut)
 
     def simulated(self, simulator: Simulator) -> Events:
         """What a simulator makes of the frames."""
@@ -126,7 +139,8 @@ class Clip:
             stop_us=self.stop_us,
             frame_times_us=self.times_us,
         )
-        ratio = len(events) / max(len(self.real), 1)
+        inside = events.window(self.start_us, self.stop_us)
+        ratio = len(inside) / max(len(self.real), 1)
         return {"eqs": self.score_events(scoring, events), "events_per_real_event": ratio, **values}
 
 
@@ -142,15 +156,19 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     """
     simulator, ranges = instantiate(cfg.sim), free_ranges(cfg.search)
     check(simulator, ranges)
+    require_judge(cfg)  # before a data set is generated
     data = dataset(cfg)
     scoring = find_scoring(cfg, data)
     train, test = (data.recordings(split) for split in ("train", "test"))
-    clips = [Clip.of(recording, data.crop_rows) for recording in train[: cfg.tune_on]]
+    shape = data.crop_rows, scoring.headline.definition.window_us
+    clips = [Clip.of(recording, *shape) for recording in train[: cfg.tune_on]]
+    counted = {clip.name: clip.windows(scoring) for clip in clips}
     search = Search(scoring, simulator, ranges, clips)
     best = run(search, cfg.evaluations)
     measured: dict[str, list[dict[str, float]]] = {"before": [], "after": []}
     for recording in test:
-        clip = Clip.of(recording, data.crop_rows)
+        clip = Clip.of(recording, *shape)
+        counted[clip.name] = clip.windows(scoring)
         measured["before"].append(clip.measures(scoring, simulator))
         measured["after"].append(clip.measures(scoring, best))
     console, results = Console(), Path(cfg.paths.results) / cfg.data.name
@@ -158,6 +176,9 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     values = {each.parameters[0]: getattr(best, each.parameters[0]) for each in ranges}
     before = {name: getattr(simulator, name) for name in values}
     print_calibration(calibration_table(measured), before, values, console)
+    fewest = fewest_windows(scoring.headline.definition.warmup_windows)
+    if few := few_windows(counted, fewest):
+        log.warning("%s", few)
     return values
 
 

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from eqs.data import EventSource
 from eqs.files import short_hash
+from eqs.metrics.grid import fewest_windows
 from eqs.names import BASELINE
 from eqs.pipelines.build import Dataset, dataset, event_source
 from eqs.pipelines.command import explained
@@ -141,7 +142,7 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         eqs=table,
         study=study_table(study, table) if runs else None,
     )
-    print_eqs(table, console)
+    print_eqs(table, console, fewest_windows(scoring.headline.definition.warmup_windows))
     if found.study is not None:
         print_study(found.study, console)
     with times.measure("report"):

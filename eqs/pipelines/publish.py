@@ -15,6 +15,7 @@ from omegaconf import DictConfig
 from eqs.data import DSECFolder, EventSource, LabelProtocol, RecordedEvents, Recording
 from eqs.drawing import detection_panels, event_rate, events_panels, rate_curves, score_maps
 from eqs.metrics import Judge, Reading
+from eqs.metrics.grid import fewest_windows
 from eqs.pipelines.build import Dataset
 from eqs.pipelines.runs import Run
 from eqs.pipelines.score import Scores
@@ -32,6 +33,7 @@ from eqs.study import (
     write_report,
     write_table,
 )
+from eqs.study.means import complete_recordings
 
 RATE_BIN_US = 5_000
 
@@ -92,16 +94,23 @@ def publish(
             timings=timings,
             unfinished=[name for name in found.systems if cards and name not in found.runs],
             judge=found.judge.description,
+            fewest_windows=fewest_windows(found.headline.definition.warmup_windows),
         ),
     )
 
 
 def anchor_table(rows: Sequence[Mapping[str, Any]], headline: str) -> pd.DataFrame:
-    """Mean score of each anchor over the recordings, the highest headline first."""
+    """Mean score of each anchor over the recordings, the highest headline first.
+
+    Convention: the recordings are those that have every anchor, `sequences` in number, so that
+    what is compared is averaged over the same of them.
+    """
     frame = pd.DataFrame(rows).rename(
         columns=lambda name: name if name in ("sequence", "anchor") else f"eqs_{name}"
     )
+    frame = complete_recordings(frame, ["anchor"])
     means = frame.drop(columns="sequence").groupby("anchor", sort=False).mean()
+    means.insert(0, "sequences", frame["sequence"].nunique())
     return means.sort_values(headline, ascending=False).reset_index()
 
 
@@ -146,6 +155,7 @@ def draw_scene(folder: Path, found: Findings, protocol: LabelProtocol) -> dict[s
     start = max(int(times[0]), stop - RATE_SPAN_US)
     rates = {name: event_rate(each, start, stop, RATE_BIN_US) for name, each in streams.items()}
     ticks = times[(times >= start) & (times <= stop)] - start
+    alike = same_sensor(found.recordings, shown.recording)
     drawn = {
         "events": events_panels(
             shown.frame, streams, start_us=stop - WINDOW_US, stop_us=stop, same="time"
@@ -153,7 +163,7 @@ def draw_scene(folder: Path, found: Findings, protocol: LabelProtocol) -> dict[s
         "event_rates": rate_curves(rates, bin_us=RATE_BIN_US, frame_times_us=ticks),
         "score_maps": score_maps(
             shown.frame,
-            mean_maps(found.scores.maps),
+            mean_maps(found.scores.maps, alike),
             patch_px=found.scores.patch_px,
             height=shown.recording.height,
             width=shown.recording.width,
@@ -167,12 +177,24 @@ def draw_scene(folder: Path, found: Findings, protocol: LabelProtocol) -> dict[s
             class_names=protocol.class_names,
             frame=shown.frame,
         )
-    return {name: report_figure(each, folder, name, place) for name, each in drawn.items()}
-
-
-def mean_maps(maps: Mapping[str, Sequence[np.ndarray]]) -> dict[str, np.ndarray]:
-    """Mean map of each system over the recordings that share the first one's sensor."""
+    covered = f"{place} Scores are means over {len(alike)} of {len(found.recordings)} recordings."
+    said = {"score_maps": covered}
     return {
-        name: np.mean([each for each in arrays if each.shape == arrays[0].shape], axis=0)
-        for name, arrays in maps.items()
+        name: report_figure(each, folder, name, said.get(name, place))
+        for name, each in drawn.items()
+    }
+
+
+def same_sensor(recordings: Sequence[Recording], shown: Recording) -> list[int]:
+    """Places of the recordings whose sensor has the size of the one that is shown."""
+    size = shown.height, shown.width
+    return [at for at, each in enumerate(recordings) if (each.height, each.width) == size]
+
+
+def mean_maps(
+    maps: Mapping[str, Sequence[np.ndarray]], alike: Sequence[int]
+) -> dict[str, np.ndarray]:
+    """Mean map of each system over the recordings at these places."""
+    return {
+        name: np.mean([arrays[place] for place in alike], axis=0) for name, arrays in maps.items()
     }

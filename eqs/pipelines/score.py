@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
-from eqs.data import EventSource, Recording, overlap_us
-from eqs.events import EventReader
+from eqs.data import EventSource, Recording
+from eqs.events import EventReader, Events
 from eqs.metrics import EventQualityScore, anchors
 from eqs.metrics.baselines import FeatureFrechet, baselines
 from eqs.metrics.definition import choices
+from eqs.metrics.grid import Grid
+from eqs.metrics.windows import common_grid
 from eqs.names import BASELINE
 from eqs.pipelines.scoring import Scoring
 
@@ -57,7 +59,7 @@ def score_recordings(
     """
     scores = Scores()
     for index, recording in enumerate(track(recordings, description="scoring")):
-        other = recordings[(index + 1) % len(recordings)]
+        other = partner(recording, [*recordings[index + 1 :], *recordings[:index]], rows)
         with ExitStack() as stack:
 
             def opened(recording: Recording, path: Path) -> EventReader:
@@ -66,12 +68,29 @@ def score_recordings(
 
             real = opened(recording, recording.events_path)
             streams = {name: opened(recording, s.path(recording)) for name, s in systems.items()}
-            unrelated = opened(other, other.events_path) if other is not recording else None
+            unrelated = opened(other, other.events_path) if other is not None else None
             try:
                 score_recording(scoring, recording, real, streams, unrelated, scores)
             except ValueError as error:
                 raise ValueError(f"{recording.name}: {error}") from error
     return scores
+
+
+def partner(
+    recording: Recording, others: Iterable[Recording], rows: int | None = None
+) -> Recording | None:
+    """The first other recording of the same sensor size, which lends the chance level.
+
+    Args:
+        recording: the recording that is scored.
+        others: the others, the preferred one first.
+        rows: rows from the top that are looked at; all of them if None.
+    """
+
+    def size(each: Recording) -> tuple[int, int]:
+        return each.height if rows is None else min(rows, each.height), each.width
+
+    return next((other for other in others if size(other) == size(recording)), None)
 
 
 def score_recording(
@@ -82,30 +101,18 @@ def score_recording(
     other: EventReader | None,
     scores: Scores,
 ) -> None:
-    """Add the scores of one recording; `other` lends the chance level."""
-    start, stop = overlap_us(recording.frame_times_us, real.start_us, real.stop_us)
+    """Add the scores of one recording; `other`, of the same size, lends the chance level."""
+    grid = recording_grid(recording, real, scoring.headline.definition.window_us)
+    start, stop = grid.start_us, grid.stop_us
     candidates = list(streams.values())
     frechet = FeatureFrechet(scoring.headline.definition.tap)
     found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
     untrained = untrained_scores(scoring, real, candidates, start, stop)
-    alike = other is not None and (other.height, other.width) == (real.height, real.width)
+    frames = recording.frame_times_us
     known = score_anchors(
-        scoring,
-        real,
-        start,
-        stop,
-        other=other if alike else None,
-        frame_times_us=recording.frame_times_us,
-        key=recording.name,
+        scoring, real, start, stop, other=other, frame_times_us=frames, key=recording.name
     )
-    shared = {
-        "sequence": recording.name,
-        "eqs_chance": known.get("chance", {}).get(scoring.headline.name, np.nan),
-        "eqs_ceiling": known["ceiling"][scoring.headline.name],
-        "n_events_real": len(real.window(start, stop)),
-        "definition": scoring.headline.definition.hash,
-        "weights_sha256": scoring.judge.weights_sha256,
-    }
+    shared = shared_columns(scoring, recording, real, grid, known)
     for (name, stream), by_reading, without, distance in zip(
         streams.items(), found, untrained, frechet.values(), strict=True
     ):
@@ -118,7 +125,7 @@ def score_recording(
                 **shared,
                 "eqs": headline.score,
                 **{f"eqs_{reading}": score.score for reading, score in by_reading.items()},
-                **score_baselines(scoring, stream, real, start, stop, recording.frame_times_us),
+                **score_baselines(scoring, stream, real, start, stop, frames),
                 f"{BASELINE}untrained_eqs": without,
                 f"{BASELINE}frechet_distance": distance,
                 "n_windows": headline.n_windows,
@@ -128,6 +135,45 @@ def score_recording(
     scores.anchors += [
         {"sequence": recording.name, "anchor": name, **values} for name, values in known.items()
     ]
+
+
+def shared_columns(
+    scoring: Scoring,
+    recording: Recording,
+    real: EventReader,
+    grid: Grid,
+    known: Mapping[str, Mapping[str, float]],
+) -> dict[str, Any]:
+    """The columns of `eqs.csv` that are the same for every system."""
+    return {
+        "sequence": recording.name,
+        "eqs_chance": known.get("chance", {}).get(scoring.headline.name, np.nan),
+        "eqs_ceiling": known["ceiling"][scoring.headline.name],
+        "start_us": grid.start_us,
+        "stop_us": grid.stop_us,
+        "n_events_real": len(real.window(grid.start_us, grid.stop_us)),
+        "definition": scoring.headline.definition.hash,
+        "weights_sha256": scoring.judge.weights_sha256,
+    }
+
+
+def recording_grid(recording: Recording, real: EventReader, window_us: int) -> Grid:
+    """The windows of a recording: those of its real events and a clip as long as its frames.
+
+    It is what two files of that recording are compared over, too: whatever is simulated from
+    these frames states their time as its span.
+
+    Raises:
+        ValueError: there are no frames, or they share no whole window with the real events.
+    """
+    times = recording.frame_times_us
+    if not len(times):
+        raise ValueError(
+            "Expected frames that say which time is scored, got none; add images/timestamps.txt"
+        )
+    silence = Events.empty(real.height, real.width)
+    clip = replace(silence, span_us=(int(times[0]), int(times[-1])))
+    return common_grid([real, clip], window_us)
 
 
 def untrained_scores(
@@ -169,6 +215,11 @@ def score_baselines(
     return {f"{BASELINE}{name}": value for name, value in found.items()}
 
 
+def first_events(reader: EventReader) -> Events:
+    """The first quarter minute of a recording's events."""
+    return reader.window(reader.start_us, reader.start_us + ANCHOR_US)
+
+
 def score_anchors(
     scoring: Scoring,
     real: EventReader,
@@ -184,7 +235,7 @@ def score_anchors(
     events = real.window(start_us, stop_us)
     streams = anchors(
         events,
-        other=None if other is None else other.window(other.start_us, other.start_us + ANCHOR_US),
+        other=None if other is None else first_events(other),
         frame_times_us=frame_times_us,
         window_us=scoring.headline.definition.window_us,
         start_us=start_us,

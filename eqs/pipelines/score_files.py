@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import logging
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,44 @@ from rich.table import Table
 from eqs.events import EventReader
 from eqs.extras import DISTRIBUTION
 from eqs.files import complete_file, write_json
-from eqs.metrics import StreamScore, window_starts
+from eqs.metrics import StreamScore
+from eqs.metrics.grid import Grid, fewest_windows
+from eqs.metrics.windows import common_grid
 from eqs.pipelines.command import explained
 from eqs.pipelines.score import score_anchors
 from eqs.pipelines.scoring import Scoring, find_scoring
 
 log = logging.getLogger(__name__)
+
+FEW_WINDOWS = (
+    "Few windows count (%d): a score of fewer than %d says little, with a warm-up cut short; give "
+    "longer files"
+)
+UNKNOWN_SPAN = (
+    "%s does not say from when to when its camera was watching, so the extent of the real file is "
+    "scored; if the frames cover less, a study scores less: set start_us and stop_us to theirs"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """What two files were found to be to each other.
+
+    Args:
+        grid: the windows that were compared.
+        scores: by reading.
+        anchors: scores by anchor and reading.
+        events: numbers of events in these windows.
+        watched_us: the span that the simulated file states.
+        size: rows and columns that were looked at.
+    """
+
+    grid: Grid
+    scores: dict[str, StreamScore]
+    anchors: dict[str, dict[str, float]]
+    events: dict[str, int]
+    watched_us: tuple[int, int] | None
+    size: tuple[int, int]
 
 
 @explained
@@ -31,47 +64,63 @@ def score_files(cfg: DictConfig) -> None:
         FileNotFoundError: a file is missing.
         ValueError: there is no judge, or the streams share no whole window or no sensor size.
     """
-    scoring = find_scoring(cfg, None)
-    headline = scoring.headline.definition
-    size = (cfg.height, cfg.width)
+    scoring, out = find_scoring(cfg, None), Path(cfg.out)
+    pair = compare(cfg, scoring)
+    result, window_us = pair.scores[scoring.headline.name], pair.grid.window_us
+    files = {"simulated": str(cfg.simulated), "real": str(cfg.real)}
+    write_json(out / "score.json", files | record(pair, scoring))
+    write_curve(out / "curve.csv", result, pair.grid.start_us, window_us)
+    show(pair, scoring, Console())
+    fewest = fewest_windows(scoring.headline.definition.warmup_windows)
+    if result.n_windows < fewest:
+        log.warning(FEW_WINDOWS, result.n_windows, fewest)
+    if pair.watched_us is None and (cfg.start_us is None or cfg.stop_us is None):
+        log.warning(UNKNOWN_SPAN, cfg.simulated)
+    ceiling = pair.anchors["ceiling"][scoring.headline.name]
+    if find_spec("matplotlib") is None:
+        log.info("no figures: they take pip install '%s[report]'", DISTRIBUTION)
+    else:
+        draw(out, result, window_us=window_us, ceiling=ceiling, size=pair.size)
+
+
+def compare(cfg: DictConfig, scoring: Scoring) -> Pair:
+    """Score the files over the windows that a study would cut."""
+    size, window_us = (cfg.height, cfg.width, cfg.rows), scoring.headline.definition.window_us
     with (
         EventReader(cfg.real, *size) as real,
         EventReader(cfg.simulated, *size) as simulated,
     ):
-        starts = window_starts([real, simulated], headline.window_us, cfg.start_us, cfg.stop_us)
-        span = int(starts[0]), int(starts[-1]) + headline.window_us
-        (found,) = scoring.score(real, [simulated], start_us=span[0], stop_us=span[1])
-        known = score_anchors(scoring, real, *span)
-        counts = {
-            "simulated": len(simulated.window(*span)),
-            "real": len(real.window(*span)),
-        }
-        height, width = real.height, real.width
-    scores = {name: score.score for name, score in found.items()}
-    result, out = found[scoring.headline.name], Path(cfg.out)
-    write_json(
-        out / "score.json",
-        {
-            "simulated": str(cfg.simulated),
-            "real": str(cfg.real),
-            "eqs": result.score,
-            "readings": scores,
-            "by_stage": list(result.by_stage),
-            "anchors": known,
-            "span_us": list(span),
-            "windows": result.n_windows,
-            "events": counts,
-            "definition": headline.hash,
-            "weights_sha256": scoring.judge.weights_sha256,
-        },
-    )
-    write_curve(out / "curve.csv", result, span[0], headline.window_us)
-    show(scores, known, counts, scoring, Console())
-    ceiling = known["ceiling"][scoring.headline.name]
-    if find_spec("matplotlib") is None:
-        log.info("no figures: they take pip install '%s[report]'", DISTRIBUTION)
-    else:
-        draw(out, result, window_us=headline.window_us, ceiling=ceiling, size=(height, width))
+        grid = common_grid([real, simulated], window_us, cfg.start_us, cfg.stop_us)
+        span = grid.start_us, grid.stop_us
+        (scores,) = scoring.score(real, [simulated], start_us=span[0], stop_us=span[1])
+        files = {"simulated": simulated, "real": real}
+        return Pair(
+            grid=grid,
+            scores=scores,
+            anchors=score_anchors(scoring, real, *span),
+            events={name: len(each.window(*span)) for name, each in files.items()},
+            watched_us=simulated.span_us,
+            size=(real.height, real.width),
+        )
+
+
+def record(pair: Pair, scoring: Scoring) -> dict[str, Any]:
+    """What `score.json` says of a pair."""
+    result = pair.scores[scoring.headline.name]
+    return {
+        "eqs": result.score,
+        "readings": {name: score.score for name, score in pair.scores.items()},
+        "by_stage": list(result.by_stage),
+        "anchors": pair.anchors,
+        "span_us": [pair.grid.start_us, pair.grid.stop_us],
+        "windows": result.n_windows,
+        "share": pair.grid.share,
+        "simulated_span_us": None if pair.watched_us is None else list(pair.watched_us),
+        "sensor": list(pair.size),
+        "events": pair.events,
+        "definition": scoring.headline.definition.hash,
+        "weights_sha256": scoring.judge.weights_sha256,
+    }
 
 
 def write_curve(path: Path, score: StreamScore, start_us: int, window_us: int) -> None:
@@ -97,24 +146,28 @@ def draw(
     save_figure(curve, out, "curve")
 
 
-def show(
-    scores: dict[str, float],
-    known: dict[str, dict[str, float]],
-    counts: dict[str, Any],
-    scoring: Scoring,
-    console: Console,
-) -> None:
-    """Print every reading beside its anchors, the headline first."""
+def extent_line(grid: Grid, score: StreamScore) -> str:
+    """What was scored, in a line: the span, its windows, its share of the real file."""
+    share = "an unknown share" if grid.share is None else f"{100 * grid.share:.1f} %"
+    return (
+        f"scored from {grid.start_us} us to {grid.stop_us} us, {share} of the real file: "
+        f"{grid.count} windows, of which {score.n_windows} count after the warm-up"
+    )
+
+
+def show(pair: Pair, scoring: Scoring, console: Console) -> None:
+    """Print every reading beside its anchors, the headline first, and what was scored."""
     table = Table(title="EQS (higher is better)")
     chosen = ("ceiling", "thinned_50", "poisson", "blank")
     table.add_column("reading")
     for name in ("simulated", *chosen):
         table.add_column(name.replace("_", " "), justify="right")
-    for reading, score in scores.items():
-        values = [score, *(known[name][reading] for name in chosen)]
+    for reading, score in pair.scores.items():
+        values = [score.score, *(pair.anchors[name][reading] for name in chosen)]
         table.add_row(reading, *(f"{value:.3f}" for value in values))
     console.print(table)
+    console.print(extent_line(pair.grid, pair.scores[scoring.headline.name]))
     console.print(
-        f"{counts['simulated']} simulated and {counts['real']} real events; "
+        f"{pair.events['simulated']} simulated and {pair.events['real']} real events; "
         f"judge: {scoring.judge.description} ({scoring.judge.weights_sha256[:12]})"
     )

@@ -43,11 +43,15 @@ def answer(
 
 def _closest(eqs: pd.DataFrame) -> str:
     means = summarise_eqs(eqs).dropna(subset=["eqs"]).sort_values("eqs", ascending=False)
-    if means.empty:
+    if eqs["eqs"].isna().all():
         return "No simulator has been scored yet."
+    if means.empty:
+        return "No sequence has been scored for every simulator, so EQS cannot compare them."
     best = means.iloc[0]
     words = f"By EQS, the closest simulator to the real stream is {best['system']} "
     words += f"(EQS {best['eqs']:.3f}, higher is better{_anchored(best)})"
+    if best["sequences"] < eqs["sequence"].nunique():
+        words += f", over the {best['sequences']} sequences that all of them have"
     if len(means) == 1:
         return f"{words}, the only one scored."
     others = (f"{row['system']} ({row['eqs']:.3f})" for _, row in means.iloc[1:].iterrows())
@@ -62,8 +66,13 @@ def _anchored(row: pd.Series) -> str:
     if not np.isfinite(row["eqs_chance"]) or not np.isfinite(row["eqs_ceiling"]):
         return ""
     return f"; an unrelated scene gets {row['eqs_chance']:.3f} and the ceiling is " + (
-        f"{row['eqs_ceiling']:.3f}"
+        f"{row['eqs_ceiling']:.3f}" + _anchored_part(row)
     )
+
+
+def _anchored_part(row: pd.Series) -> str:
+    fewer = 0 < row["anchored"] < row["sequences"]
+    return f", over {row['anchored']} of {row['sequences']} sequences" if fewer else ""
 
 
 def _lead(eqs: pd.DataFrame, first: str, second: str) -> tuple[int, int]:

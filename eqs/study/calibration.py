@@ -10,8 +10,12 @@ from rich.table import Table
 
 
 def calibration_table(measured: Mapping[str, Sequence[Mapping[str, float]]]) -> pd.DataFrame:
-    """Means over recordings, a row for each measure and a column for before and after."""
-    return pd.DataFrame({name: pd.DataFrame(list(rows)).mean() for name, rows in measured.items()})
+    """Means over recordings, a row for each measure and a column for before and after.
+
+    A measure that one of the recordings lacks has no mean.
+    """
+    frames = {name: pd.DataFrame(list(rows)) for name, rows in measured.items()}
+    return pd.DataFrame({name: frame.mean(skipna=False) for name, frame in frames.items()})
 
 
 def print_calibration(

@@ -29,7 +29,8 @@ FIGURE_TEXTS = {
     ),
     "scores_by_sequence": (
         "EQS of every test sequence",
-        "Each dot is one test sequence, each black tick the mean; thin lines join the same "
+        "Each dot is one test sequence, each black tick the mean over the sequences that every "
+        "simulator was scored on; thin lines join the same "
         "sequence, because simulators can be compared fairly only on the same scene. To the "
         "right is better.",
     ),

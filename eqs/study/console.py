@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.table import Table as ConsoleTable
 
 from eqs.study.layout import Table, number, scores_table
-from eqs.study.sanity import order_faults, readings, severity_correlations
+from eqs.study.notes import notes
+from eqs.study.sanity import order_faults, readings, severity_correlations, untested
 from eqs.study.tables import MAP_COLUMNS, Drops, score_columns, summarise_eqs, summarise_study
 
 CELL_FRAME = 3  # a border and a space on either side
@@ -23,15 +24,21 @@ def print_study(study: pd.DataFrame, console: Console) -> None:
     _print(_chosen(systems, names), "Detection accuracy (mAP, drops: x 100)", console)
 
 
-def print_eqs(eqs: pd.DataFrame, console: Console) -> None:
-    """Print the scores of every system: by sequence, then means with chance and ceiling."""
+def print_eqs(eqs: pd.DataFrame, console: Console, fewest_windows: int = 2) -> None:
+    """Print the scores of every system: by sequence, then means with chance and ceiling.
+
+    Below stands which sequences the means cover where these are not all, and which are short.
+    """
     _print(scores_table(eqs), "EQS by sequence (higher is better)", console)
     means = summarise_eqs(eqs)
-    names = ["system", "sequences", "eqs", "eqs_chance", "eqs_ceiling", "eqs_scaled"]
+    fewer = ["anchored"] if (means["anchored"] < means["sequences"]).any() else []
+    names = ["system", "sequences", "eqs", *fewer, "eqs_chance", "eqs_ceiling", "eqs_scaled"]
     variants = [name for name in score_columns(means) if name != "eqs"]
     _print(_chosen(means, names), "Event Quality Score (higher is better)", console)
     if variants:
         _print(_chosen(means, ["system", *variants]), "EQS by activation", console)
+    for note in notes(eqs, fewest_windows):
+        console.print(f"[bold]note[/bold]: {note}")
 
 
 def print_sanity(
@@ -47,8 +54,9 @@ def print_sanity(
     )
     _print(Table(header=("corruption", headline), rows=rows), "Sanity battery", console)
     for name in [headline, *(name for name in readings(table) if name != headline)]:
-        faults = order_faults(table, name, expected)
+        faults, unknown = order_faults(table, name, expected), untested(table, name, expected)
         verdict = "as expected" if not faults else "not as expected, " + ", ".join(faults)
+        verdict += f"; not tested: {', '.join(unknown)}" * bool(unknown)
         console.print(f"[bold]{name}[/bold]: order {verdict}")
         ranks = severity_correlations(table, name).items()
         console.print("  Spearman of severity: " + "; ".join(f"{k} {v:.2f}" for k, v in ranks))

@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from eqs.drawing.style import MARKERS, STYLE, colours, figure
 from eqs.names import REFERENCE
 from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
+from eqs.study.means import complete_seeds
 from eqs.study.tables import simulated, summarise_eqs, summarise_study
 
 # Column, axis label, factor from the table's unit to the axis.
@@ -61,7 +62,7 @@ def score_against_accuracy(
 def _points(
     axes: Axes, systems: pd.DataFrame, study: pd.DataFrame, column: str, factor: float
 ) -> None:
-    spread = factor * study.groupby("system")[column].std()
+    spread = factor * complete_seeds(study).groupby("system")[column].std()
     colour = colours(systems["system"])
     for at, (_, row) in enumerate(systems.iterrows()):
         x, y = row["eqs"], factor * row[column]
@@ -181,14 +182,15 @@ def sequence_dots(eqs: pd.DataFrame) -> Figure:
     with mpl.rc_context({**STYLE, "axes.grid.axis": "x"}):
         drawing = figure(7.5, 1.4 + 0.6 * len(names))
         axes = drawing.subplots()
-        _anchor_lines(axes, summarise_eqs(table)[["eqs_chance", "eqs_ceiling"]].mean())
+        means = summarise_eqs(table).set_index("system")
+        _anchor_lines(axes, means[["eqs_chance", "eqs_ceiling"]].mean())
         for _, row in wide[names].iterrows():
             axes.plot(row, place, color="#bbbbbb", linewidth=0.7, zorder=2)
         for name, height in zip(names, place, strict=True):
             values = wide[name].to_numpy(dtype=float)
             axes.scatter(values, np.full(len(values), height), s=28, color=colour[name], zorder=3)
-            if np.isfinite(values).any():
-                mean = np.nanmean(values)
+            mean = means.loc[name, "eqs"]
+            if np.isfinite(mean):
                 axes.plot(mean, height, "|", color="black", markersize=24, markeredgewidth=2)
                 axes.annotate(
                     f"{mean:.3f}",

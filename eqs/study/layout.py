@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from eqs.names import BASELINE, REFERENCE
+from eqs.study.means import shared_sequences
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.tables import (
     MAP_COLUMNS,
@@ -61,9 +62,10 @@ def scores_table(eqs: pd.DataFrame) -> Table:
 
     Convention: where a simulator lacks a sequence, the average covers the sequences of all.
     """
+    shared = shared_sequences(simulated(eqs))["sequence"].unique()
     wide = simulated(eqs).pivot(index="sequence", columns="system", values="eqs")
     wide = wide[list(dict.fromkeys(simulated(eqs)["system"]))].sort_index()
-    complete = wide.dropna()
+    complete = wide.loc[wide.index.isin(shared)]
     if len(complete):
         name = "average" if len(complete) == len(wide) else "average of complete rows"
         wide.loc[name] = complete.mean()
@@ -84,7 +86,9 @@ def accuracy_table(systems: pd.DataFrame) -> Table:
         theirs = printed.loc[row["simulator"]] if known else {}
         rows.append(
             (
-                str(row["system"]) + (" (no simulator)" if row["simulator"] == REFERENCE else ""),
+                str(row["system"])
+                + (" (no simulator)" if row["simulator"] == REFERENCE else "")
+                + (f", seeds: {row['seeds']}" if systems["seeds"].nunique() > 1 else ""),
                 _with_spread(row, "map_sim"),
                 _with_spread(row, "map_real"),
                 number(row["drop_abs"], "drop_abs"),
@@ -114,6 +118,7 @@ def summary_table(eqs: pd.DataFrame) -> Table:
     """Every score column per simulator, averaged over sequences, with chance and ceiling."""
     means = summarise_eqs(eqs)
     names = [*score_columns(means), "eqs_chance", "eqs_ceiling", "eqs_scaled", "sequences"]
+    names += ["anchored"] * bool((means["anchored"] < means["sequences"]).any())
     names += ["n_events_sim", "n_events_real"]
     return frame_table(means[["system", *names]])
 
@@ -121,12 +126,16 @@ def summary_table(eqs: pd.DataFrame) -> Table:
 def baselines_table(eqs: pd.DataFrame, study: pd.DataFrame | None = None) -> Table:
     """EQS and every rival per simulator, one row per score.
 
-    Averaged over sequences, or over seeds where only the study knows the score.
+    Averaged over sequences, or over seeds where only the study knows the score: over those for
+    which it is known of every system.
     """
     means = summarise_eqs(eqs).set_index("system")
     if study is not None:
+        trained = study[study["system"].isin(means.index)]
         others = [name for name in baseline_columns(study) if name not in means]
-        means = means.join(study.groupby("system")[others].mean())
+        for name in others:
+            wide = trained.pivot(index="seed", columns="system", values=name)
+            means[name] = wide.dropna(axis="columns", how="all").dropna().mean()
     names = ["eqs", *baseline_columns(means)]
     rows = [
         (

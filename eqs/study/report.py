@@ -24,6 +24,7 @@ from eqs.study.layout import (
     scores_table,
     summary_table,
 )
+from eqs.study.notes import notes
 from eqs.study.printed import ACCURACY_TABLE, SCORES_TABLE
 from eqs.study.tables import (
     RATIO_FLOOR,
@@ -60,6 +61,7 @@ class ReportContent:
         timings: seconds by phase.
         unfinished: simulators without a finished run.
         judge: what the scoring backbone was trained on, in a sentence.
+        fewest_windows: windows below which the score of a recording says little.
     """
 
     data_name: str
@@ -74,6 +76,7 @@ class ReportContent:
     timings: Mapping[str, float] = field(default_factory=dict)
     unfinished: Sequence[str] = ()
     judge: str = ""
+    fewest_windows: int = 2
 
 
 def write_report(folder: Path | str, content: ReportContent) -> Path:
@@ -99,6 +102,7 @@ def render_report(content: ReportContent) -> str:
     return template.render(
         content=content,
         trained=content.study is not None and len(content.study) > 0,
+        notes=notes(content.eqs, content.fewest_windows),
         answer=answer(content.eqs, content.study, content.correlations),
         real="reference sensor" if content.data_is_rendered else "real sensor",
         tables=_tables(content),

@@ -13,13 +13,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from eqs.drawing.style import STYLE, figure
+from eqs.study.means import complete_recordings
 from eqs.study.statistics import spearman
 
-NAMES = ("sequence", "corruption", "severity")
+NAMES = ("sequence", "sequences", "corruption", "severity")
 
 
 def sanity_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     """Mean over recordings, one row per corruption and severity; a column for each reading.
+
+    Convention: the recordings are those that have every corruption, `sequences` in number, so
+    that what is compared is averaged over the same of them.
 
     Args:
         rows: each with `sequence`, `corruption`, `severity` (None for single corruptions) and
@@ -27,10 +31,12 @@ def sanity_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
     """
     frame = pd.DataFrame(list(rows))
     frame["severity"] = frame["severity"].astype(float)
-    groups = frame.drop(columns="sequence").groupby(
-        ["corruption", "severity"], sort=False, dropna=False
-    )
-    return groups.mean().reset_index()
+    kind = ["corruption", "severity"]
+    frame = complete_recordings(frame, kind)
+    groups = frame.drop(columns="sequence").groupby(kind, sort=False, dropna=False)
+    table = groups.mean().reset_index()
+    table.insert(2, "sequences", frame["sequence"].nunique())
+    return table
 
 
 def readings(table: pd.DataFrame) -> list[str]:
@@ -50,9 +56,15 @@ def order_faults(table: pd.DataFrame, reading: str, expected: Sequence[str]) -> 
         ['chance < blank']
     """
     single = table[table["severity"].isna()].set_index("corruption")[reading]
-    known = [name for name in expected if name in single.index]
-    pairs = itertools.pairwise(known)
+    unknown = untested(table, reading, expected)
+    pairs = itertools.pairwise(name for name in expected if name not in unknown)
     return [f"{a} < {b}" for a, b in pairs if single[a] < single[b]]
+
+
+def untested(table: pd.DataFrame, reading: str, expected: Sequence[str]) -> list[str]:
+    """The streams of the expected order that the table has no score of."""
+    single = table[table["severity"].isna()].dropna(subset=[reading])["corruption"]
+    return [name for name in expected if name not in set(single)]
 
 
 def severity_correlations(table: pd.DataFrame, reading: str) -> dict[str, float]:

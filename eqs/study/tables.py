@@ -11,6 +11,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from eqs.names import BASELINE, REFERENCE
+from eqs.study.means import (
+    ANCHORED,
+    anchored_sequences,
+    complete_seeds,
+    shared_sequences,
+    whole_means,
+)
 
 RATIO_FLOOR = 0.10
 """Below this simulated mAP a ratio to it rests on too little to be read."""
@@ -39,6 +46,8 @@ EQS_COLUMNS = (
     "eqs_chance",
     "eqs_ceiling",
     "eqs_scaled",
+    "start_us",
+    "stop_us",
     "n_windows",
     "n_events_real",
     "n_events_sim",
@@ -50,6 +59,7 @@ TEXT_COLUMNS = frozenset(
     | {"definition", "weights_sha256", "protocol", "recipe", "data"}
 )
 COUNT_COLUMNS = ("n_windows", "n_events_real", "n_events_sim")
+TIME_COLUMNS = ("start_us", "stop_us")
 
 
 class Drops(NamedTuple):
@@ -131,8 +141,7 @@ def study_table(
     table[precision] = table[precision].astype(float)
     table[precision] = table[precision].where(table[precision] >= 0)
     _refuse_percentages(table, precision)
-    lost = [drops(sim, real) for sim, real in zip(table["map_sim"], table["map_real"], strict=True)]
-    table[list(Drops._fields)] = np.array(lost, dtype=float).reshape(-1, 3)
+    table[list(Drops._fields)] = _lost(table)
     if scores is not None:
         means = summarise_eqs(scores)
         joined = [*score_columns(means), *baseline_columns(means), "definition", "weights_sha256"]
@@ -161,7 +170,7 @@ def eqs_table(rows: Iterable[Mapping[str, Any]] | pd.DataFrame) -> pd.DataFrame:
     table[numbers] = table[numbers].astype(float)
     table["eqs_distance"] = 1 - table["eqs"]
     table["eqs_scaled"] = scaled_score(table["eqs"], table["eqs_chance"], table["eqs_ceiling"])
-    for name in COUNT_COLUMNS:
+    for name in (*TIME_COLUMNS, *COUNT_COLUMNS):
         table[name] = table[name].astype("Int64")
     for name in ("definition", "weights_sha256"):
         found = sorted(table[name].dropna().unique())
@@ -176,16 +185,17 @@ def eqs_table(rows: Iterable[Mapping[str, Any]] | pd.DataFrame) -> pd.DataFrame:
 def summarise_study(study: pd.DataFrame) -> pd.DataFrame:
     """One row per system: means over seeds, `seeds`, and `_sd` columns of the two mAPs.
 
-    Convention: drops and retention follow from the mean mAPs, so a row agrees with itself; `_sd`
-    is the sample standard deviation, NaN with one seed.
+    Convention: a seed counts that has both mAPs, where a system has one. Drops and retention
+    follow from the mean mAPs, so a row agrees with itself; `_sd` is the sample standard deviation,
+    NaN with one seed.
     """
+    study = complete_seeds(study)
     numbers = [name for name in study.select_dtypes("number") if name not in ("seed", "seeds")]
     groups = study.groupby("system", sort=False)
     means = groups[numbers].mean()
     for name in ("map_sim", "map_real"):
         means[f"{name}_sd"] = groups[name].std()
-    lost = [drops(sim, real) for sim, real in zip(means["map_sim"], means["map_real"], strict=True)]
-    means[list(Drops._fields)] = np.array(lost, dtype=float).reshape(-1, 3)
+    means[list(Drops._fields)] = _lost(means)
     means.insert(0, "simulator", groups["simulator"].first())
     means.insert(1, "seeds", groups["seed"].nunique())
     return means.reset_index()
@@ -194,25 +204,29 @@ def summarise_study(study: pd.DataFrame) -> pd.DataFrame:
 def summarise_eqs(scores: pd.DataFrame) -> pd.DataFrame:
     """One row per system: unweighted means over sequences, `sequences`, `eqs_sd`, summed counts.
 
-    Convention: `eqs_scaled` follows from the mean score, chance and ceiling.
+    Convention: means cover the sequences for which every system has a score; a column that lacks
+    a value there has no mean. Chance, ceiling and `eqs_scaled` cover those among them whose chance
+    and ceiling are both known, `anchored` in number, and so does the score that `eqs_scaled`
+    follows from.
     """
-    groups = scores.groupby("system", sort=False)
-    averaged = [
-        *score_columns(scores),
-        *baseline_columns(scores),
-        "eqs_distance",
-        "eqs_chance",
-        "eqs_ceiling",
-    ]
-    means = groups[averaged].mean()
-    means["eqs_scaled"] = scaled_score(means["eqs"], means["eqs_chance"], means["eqs_ceiling"])
+    systems, rows = scores.groupby("system", sort=False), shared_sequences(scores)
+    groups, averaged = rows.groupby("system", sort=False), [*score_columns(scores)]
+    averaged += [*baseline_columns(scores), "eqs_distance", "eqs_chance", "eqs_ceiling"]
+    means = whole_means(rows, averaged).reindex(systems.size().index)
+    anchored = anchored_sequences(scores).groupby("system", sort=False)
+    known = anchored[list(ANCHORED)].mean()
+    means.update(known.drop(columns="eqs"))
+    means["eqs_scaled"] = scaled_score(known["eqs"], known["eqs_chance"], known["eqs_ceiling"])
     means["eqs_sd"] = groups["eqs"].std()
-    means.insert(0, "simulator", groups["simulator"].first())
+    means.insert(0, "simulator", systems["simulator"].first())
     means.insert(1, "sequences", groups["sequence"].nunique())
+    means.insert(2, "anchored", anchored["sequence"].nunique())
+    counted = ["sequences", "anchored"]
+    means[counted] = means[counted].fillna(0).astype(int)
     for name in COUNT_COLUMNS:
         means[name] = groups[name].sum(min_count=1)
     for name in ("definition", "weights_sha256"):
-        means[name] = groups[name].first()
+        means[name] = systems[name].first()
     return means.reset_index()
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from eqs.files import write_text
-from eqs.study.tables import COUNT_COLUMNS, TEXT_COLUMNS
+from eqs.study.tables import COUNT_COLUMNS, TEXT_COLUMNS, TIME_COLUMNS
 
 log = logging.getLogger(__name__)
 # What tells one row of a table from another.
@@ -54,4 +54,5 @@ def read_table(path: Path | str) -> pd.DataFrame:
     header = pd.read_csv(path, nrows=0).columns
     text = {name: str for name in header if name in TEXT_COLUMNS or name.endswith("_hash")}
     table = pd.read_csv(path, dtype=text)
-    return table.astype({name: "Int64" for name in COUNT_COLUMNS if name in table})
+    whole = (*TIME_COLUMNS, *COUNT_COLUMNS)
+    return table.astype({name: "Int64" for name in whole if name in table})

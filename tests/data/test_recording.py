@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from eqs.data import Recording, detection_windows, overlap_us
+from eqs.data import Recording, detection_windows
 
 
 def test_reads_everything(tmp_path, make_recording):
@@ -179,10 +179,3 @@ def test_windows_end_at_frames():
     np.testing.assert_array_equal(windows[:, 1], times[1:])
     assert set(np.diff(windows, axis=1).ravel()) == {50_000}
     assert detection_windows(times[:1]).shape == (0, 2)
-
-
-def test_overlap_of_frames_and_events():
-    assert overlap_us(np.array([10, 20, 30]), 15, 100) == (15, 30)
-    assert overlap_us(np.array([10, 20, 30]), 0, 25) == (10, 25)
-    assert overlap_us(np.array([10, 20]), 50, 90) == (50, 50)
-    assert overlap_us(np.array([], np.int64), 50, 90) == (50, 50)

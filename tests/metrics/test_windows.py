@@ -8,7 +8,7 @@ import torch
 
 from eqs.events import EventReader, Events
 from eqs.metrics import Definition, group_chunks, normalised_counts, window_starts
-from eqs.metrics.windows import chunk_length
+from eqs.metrics.windows import chunk_length, common_grid
 from eqs.representations import stacked_histogram
 
 
@@ -31,6 +31,22 @@ def test_a_stated_span_wins_over_events():
 def test_last_event_belongs_to_the_overlap():
     assert window_starts([at(0, 19)], 10).tolist() == [0, 10]
     assert window_starts([at(0, 18)], 10).tolist() == [0]
+
+
+def test_silence_at_either_end_of_a_candidate_that_states_its_span_is_compared():
+    clip = replace(at(70, 75), span_us=(0, 80))
+    assert window_starts([at(0, 39), clip], 20).tolist() == [0, 20]
+    assert window_starts([at(60, 79), replace(at(1, 5), span_us=(0, 80))], 20).tolist() == [60]
+    assert window_starts([at(0, 39), replace(at(), span_us=(0, 80))], 20).tolist() == [0, 20]
+
+
+def test_a_grid_knows_its_ends_and_its_share_of_the_reference():
+    grid = common_grid([at(0, 99), replace(at(), span_us=(10, 85))], 20)
+    assert (grid.start_us, grid.stop_us, grid.count) == (10, 70, 3)
+    assert grid.share == pytest.approx(0.6)
+    assert common_grid([replace(at(5), span_us=(0, 100)), at(5)], 30).share == pytest.approx(0.9)
+    assert common_grid([at(50, 99), at(50, 99)], 20, 0, 100).share == 1.0
+    assert common_grid([at(), at(0, 99)], 20).share is None
 
 
 def test_explicit_limits_win():

@@ -3,12 +3,14 @@
 import csv
 import json
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hydra import compose, initialize_config_dir
 
+from eqs.events import Events
 from eqs.metrics import scoring
 from eqs.pipelines.score_files import score_files
 
@@ -105,3 +107,83 @@ def test_the_span_may_be_given_and_is_written_down(files, tmp_path):
     found = json.loads((tmp_path / "out" / "score.json").read_text())
     assert found["span_us"] == [500_000, 1_500_000]
     assert found["windows"] == 15
+
+
+def result(simulated, real, out, *overrides):
+    run(simulated, real, out, "taps=[]", *overrides)
+    return json.loads((out / "score.json").read_text())
+
+
+def shown(text):
+    return " ".join(text.split())
+
+
+def test_the_output_says_what_was_scored(files, tmp_path, capsys):
+    limits = ["start_us=500000", "stop_us=1520000"]
+    found = result(files[1], files[0], tmp_path / "out", *limits)
+    extent = Events.load(files[0]).extent_us
+    assert found["share"] == pytest.approx(1_000_000 / (extent[1] - extent[0]))
+    assert found["sensor"] == [64, 96]
+    assert (
+        f"scored from 500000 us to 1500000 us, {100 * found['share']:.1f} % of the real file: "
+        "20 windows, of which 15 count after the warm-up"
+    ) in shown(capsys.readouterr().out)
+
+
+def test_a_file_that_states_no_span_is_named(files, tmp_path, caplog):
+    found = result(files[1], files[0], tmp_path / "out")
+    assert "1.h5 does not say from when to when its camera was watching" in caplog.text
+    assert found["simulated_span_us"] is None
+    caplog.clear()
+    result(files[1], files[0], tmp_path / "given", "start_us=0", "stop_us=1000000")
+    assert "does not say" not in caplog.text
+    stated = replace(Events.load(files[1]), span_us=(200_000, 1_210_000))
+    stated.save(tmp_path / "stated.h5")
+    found = result(tmp_path / "stated.h5", files[0], tmp_path / "stated")
+    assert "does not say" not in caplog.text
+    assert found["simulated_span_us"] == [200_000, 1_210_000]
+    assert found["span_us"] == [200_000, 1_200_000]
+
+
+@pytest.mark.parametrize("span_us", [None, (0, 2_000_000)])
+def test_a_file_without_events_is_scored_as_silence(files, tmp_path, span_us):
+    silence = replace(Events.empty(64, 96), span_us=span_us)
+    silence.save(tmp_path / "silence.h5")
+    found = result(tmp_path / "silence.h5", files[0], tmp_path / "out")
+    assert found["events"]["simulated"] == 0 < found["events"]["real"]
+    assert found["eqs"] == pytest.approx(found["anchors"]["blank"]["hidden_raw"], abs=1e-6)
+    assert found["share"] > 0.95
+
+
+@pytest.mark.parametrize("kept", [(0, 1_000_000), (1_000_000, 2_000_000)])
+def test_silence_at_either_end_counts(files, tmp_path, kept):
+    real = Events.load(files[0])
+    replace(real.window(*kept), span_us=None).save(tmp_path / "half.h5")
+    found = result(tmp_path / "half.h5", files[0], tmp_path / "out", "eqs.warmup_windows=0")
+    assert found["windows"] == 39
+    assert found["eqs"] < 0.999
+    with (tmp_path / "out" / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    silent = [float(r["eqs"]) for r in rows if not kept[0] < int(r["stop_us"]) <= kept[1]]
+    assert len(silent) in (19, 20)
+    assert np.mean(silent) < min(0.999, found["eqs"])
+
+
+def test_rows_leave_out_what_lies_below(files, tmp_path):
+    whole = Events.load(files[0])
+    top = whole.y < 32
+    fields = {name: getattr(whole, name)[top] for name in "txyp"}
+    Events(**fields, height=64, width=96).save(tmp_path / "top.h5")
+    limits = ["start_us=0", "stop_us=2000000"]
+    found = result(tmp_path / "top.h5", files[0], tmp_path / "rows", "rows=32", *limits)
+    assert found["sensor"] == [32, 96]
+    assert found["eqs"] == pytest.approx(1.0, abs=1e-6)
+    assert result(tmp_path / "top.h5", files[0], tmp_path / "all", *limits)["eqs"] < 0.999
+
+
+def test_few_windows_are_named(files, tmp_path, caplog):
+    result(files[1], files[0], tmp_path / "out", "start_us=0", "stop_us=1000000")
+    assert "Few windows count (15): a score of fewer than 20 says little" in caplog.text
+    caplog.clear()
+    result(files[1], files[0], tmp_path / "whole", "start_us=0", "stop_us=2000000")
+    assert "Few windows" not in caplog.text

@@ -260,9 +260,12 @@ def test_the_study_is_written_down(place: Path, trained: dict[str, RunResult]) -
     assert study.set_index("simulator")["baseline_reverse_map"].notna()["esim"]
     assert scores["weights_sha256"].nunique() == scores["definition"].nunique() == 1
     anchors = pd.read_csv(results / "anchors.csv").set_index("anchor")
-    assert (anchors.loc["identical"] - 1).abs().max() < 1e-6
+    assert (anchors.filter(like="eqs_").loc["identical"] - 1).abs().max() < 1e-6
+    assert (anchors["sequences"] == 2).all()
+    assert (scores["stop_us"] - scores["start_us"] == 7 * 50_000).all()
     assert json.loads((results / "correlation.json").read_text())["results"]
     report = (results / "report.html").read_text()
     assert str(place) not in report
+    assert "Few windows" not in report  # six count, after a warm-up of one
     assert "reference sensor" in report
     assert "http" not in report.replace("http://www.w3.org", "")

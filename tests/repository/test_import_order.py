@@ -27,10 +27,10 @@ ROOMS = {
     "eqs.models": "",
     "eqs.metrics.baselines": "events metrics",
     "eqs.metrics": "events extras files models representations",
-    "eqs.training": "data drawing events files metrics models representations",
+    "eqs.training": "content data drawing events files metrics models representations",
     "eqs.study": "drawing files names",
-    "eqs.pipelines": "data drawing events extras files frames metrics metrics.baselines models "
-    "names processors simulators study training",
+    "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
+    "models names processors simulators study training",
     "eqs.commands": "data drawing events extras pipelines",
     "eqs.__main__": "commands",
 }
