@@ -9,7 +9,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Protocol
 
-from eqs.data.recording import EVENTS, FRAMES, Recording
+from eqs.data.recording import EVENTS, FRAMES, Recording, frames_in
+from eqs.frames import by_name
 
 log = logging.getLogger(__name__)
 SPLIT_FOLDERS = ("train", "val", "test")
@@ -201,7 +202,7 @@ def _existing_sequences(root: Path) -> dict[str, Path]:
             f"Expected a data set at {root}, found no such folder; set data.root"
         )
     found: dict[str, Path] = {}
-    for path in sorted(_sequence_folders(root), key=lambda path: path.name):
+    for path in by_name(_sequence_folders(root)):
         if path.name in found:
             raise ValueError(
                 f"Expected each sequence once below {root}, got {path.name} in "
@@ -225,6 +226,6 @@ def _sequence_folders(root: Path) -> Iterator[Path]:
 
 
 def _reason_to_skip(path: Path) -> str | None:
-    if not any((path / FRAMES).glob("*.png")):
+    if not frames_in(path):
         return f"has no frames in {FRAMES}"
     return None if (path / EVENTS).exists() else f"has no events in {EVENTS}"

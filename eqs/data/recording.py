@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from eqs.content import content_hash, content_hashes
 from eqs.files import short_hash, whole_numbers
-from eqs.frames import read_image
+from eqs.frames import IMAGE_SUFFIXES, checked_times, image_paths, image_size, read_image
 
 EVENTS = Path("events/left/events.h5")
 FRAMES = Path("images/left/distorted")
@@ -64,10 +64,10 @@ class Recording:
         folder = Path(folder)
         if not folder.is_dir():
             raise FileNotFoundError(f"Expected a recording at {folder}, found none; set data.root")
-        paths = tuple(sorted((folder / FRAMES).glob("*.png")))
+        paths = frames_in(folder)
         if not paths and not (folder / EVENTS).exists():
             raise ValueError(
-                f"Expected {EVENTS} or {FRAMES}/*.png in {folder}, found neither; "
+                f"Expected {EVENTS} or images in {FRAMES} in {folder}, found neither; "
                 "set data.root to a folder of recordings in the layout of DSEC"
             )
         times_us = _frame_times(folder, len(paths))
@@ -119,8 +119,8 @@ class Recording:
         """Whether boxes were labelled (perhaps none)."""
         return self.tracks is not None
 
-    def read_frame(self, index: int) -> NDArray[np.uint8]:
-        """One frame, uint8, (height, width) grey or (height, width, 3) RGB.
+    def read_frame(self, index: int) -> NDArray[Any]:
+        """One frame, (height, width) grey or (height, width, 3) RGB, see `read_image`.
 
         Raises:
             ValueError: the file is no image, or one of another size.
@@ -133,6 +133,18 @@ class Recording:
                 f"{frame.shape[1]}x{frame.shape[0]} in {path}; set data.size or replace it"
             )
         return frame
+
+
+def frames_in(folder: Path) -> tuple[Path, ...]:
+    """The frames of a sequence folder in their order; none where it has none.
+
+    Raises:
+        ValueError: their names admit two orders.
+    """
+    place = folder / FRAMES
+    if not place.is_dir() or not any(p.suffix.lower() in IMAGE_SUFFIXES for p in place.iterdir()):
+        return ()
+    return tuple(image_paths(place))
 
 
 def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
@@ -154,12 +166,15 @@ def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
             f"Expected one timestamp per frame in {folder}, got {len(times_us)} lines in "
             f"{FRAME_TIMES} and {frames} frames; complete the recording"
         )
-    if len(times_us) and (times_us[0] < 0 or np.any(np.diff(times_us) <= 0)):
+    if len(times_us) and times_us[0] < 0:
         raise ValueError(
-            f"Expected rising times of zero or more in {path}, got others; "
-            "sort frames and timestamps"
+            f"Expected times of zero or more in {path}, got {times_us[0]} us; add {-times_us[0]} "
+            "to the times of frames, labels and events"
         )
-    return times_us
+    try:
+        return checked_times(times_us, len(times_us))
+    except ValueError as error:
+        raise ValueError(f"{error} (in {path})") from error
 
 
 def _exposures(folder: Path, frames: int) -> NDArray[np.int64] | None:
@@ -176,11 +191,7 @@ def _exposures(folder: Path, frames: int) -> NDArray[np.int64] | None:
 
 
 def _frame_size(path: Path, height: int | None, width: int | None) -> tuple[int, int]:
-    try:
-        with Image.open(path) as image:
-            found_width, found_height = image.size
-    except OSError as error:
-        raise ValueError(f"Expected an image at {path}, got: {error}; replace it") from error
+    found_height, found_width = image_size(path)
     if (height or found_height, width or found_width) != (found_height, found_width):
         raise ValueError(
             f"Expected frames of {width}x{height} pixels, got {found_width}x{found_height} in "

@@ -16,7 +16,7 @@ from eqs.content import content_hash
 from eqs.data.recording import Recording
 from eqs.events.writer import EventWriter
 from eqs.files import one_at_a_time, read_json, short_hash, write_json
-from eqs.frames import FrameFolder
+from eqs.frames import WHITE, FrameFolder
 from eqs.processors import available_cores, side_by_side
 from eqs.simulators import Simulator
 
@@ -174,7 +174,7 @@ def write_stream(
     first = next(chunks, None)
     if first is None:
         raise ValueError(f"Expected frames to simulate {path} from, got none; give a longer clip")
-    stream = simulator.start(name)
+    stream = simulator.start(name, WHITE)  # which clips on disk are scaled to
     height, width = first[0].shape[1:3]
     path.parent.mkdir(parents=True, exist_ok=True)
     frames = count = 0

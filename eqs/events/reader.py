@@ -18,8 +18,10 @@ import hdf5plugin  # noqa: F401 - teaches HDF5 to decompress blosc
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.clock import backwards
 from eqs.events.stream import FIELDS, Events, as_field
 
+LOOKED_AT_ONCE = 10_000_000  # events
 STORED_TYPES = {"t": np.uint32, "x": np.uint16, "y": np.uint16, "p": np.uint8}
 
 
@@ -182,10 +184,12 @@ class _Handles:
         high = self.count if stop_ms >= len(self.index) else int(self.index[stop_ms]) + 1
         high = min(high, self.count)
         t = as_field("t", self.columns["t"][low:high])
-        if np.any(t[1:] < t[:-1]):
+        back = np.flatnonzero(t[1:] < t[:-1])
+        if len(back):
+            before, after = int(t[back[0]]), int(t[back[0] + 1])
             raise ValueError(
-                f"expected events sorted by time, got time running backwards between event {low} "
-                f"and event {high}; sort the stream and write the file again"
+                f"expected events sorted by time, got {after} us after {before} us at event "
+                f"{low + int(back[0]) + 1}; {backwards(before, after)} and write the file again"
             )
         first, last = np.searchsorted(t, [start, stop], side="left")
         if (first == 0 and low > 0) or (last == len(t) and high < self.count):
@@ -240,8 +244,17 @@ class _Handles:
             raise ValueError(
                 f"Expected events sorted by time in {path}, got the last event at "
                 f"{self.stop_us - 1} us, before the first at {self.start_us} us; "
-                "sort the stream and write the file again"
+                f"{self._advice()} and write the file again"
             )
+
+    def _advice(self) -> str:
+        """What to do about the first time that falls."""
+        for start in range(0, self.count - 1, LOOKED_AT_ONCE):
+            t = self.columns["t"][start : start + LOOKED_AT_ONCE + 1].astype(np.int64)
+            falls = np.flatnonzero(np.diff(t) < 0)
+            if len(falls):
+                return backwards(int(t[falls[0]]), int(t[falls[0] + 1]))
+        return "sort the stream"
 
     def _span(self, path: Path) -> tuple[int, int] | None:
         limits = [self.file.attrs.get(name) for name in ("start_us", "stop_us")]

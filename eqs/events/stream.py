@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.clock import backwards
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -99,7 +101,7 @@ class Events:
             at = int(step[0]) + 1
             raise ValueError(
                 f"Expected events sorted by time, got {self.t[at]} us after {self.t[at - 1]} us "
-                f"at index {at}; sort the stream by t first"
+                f"at index {at}; {backwards(int(self.t[at - 1]), int(self.t[at]))}"
             )
         x, y, p = int(self.x.max()), int(self.y.max()), int(self.p.max())
         if x >= self.width or y >= self.height:

@@ -12,6 +12,7 @@ import hdf5plugin
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.clock import backwards
 from eqs.events.reader import STORED_TYPES
 from eqs.events.stream import Events
 from eqs.files import complete_file
@@ -34,6 +35,9 @@ class EventWriter:
         width: columns of the sensor.
         t_offset_us: time from which the stored times count; by default that of the first event.
 
+    Raises:
+        ValueError: the times count from one below zero.
+
     Example:
         >>> import tempfile
         >>> from eqs.events import EventReader
@@ -53,6 +57,11 @@ class EventWriter:
     ) -> None:
         """Remember the file's name; nothing is created yet."""
         self.path = Path(path)
+        if t_offset_us is not None and t_offset_us < 0:
+            raise ValueError(
+                f"Expected a clip that begins at zero or later for {self.path}, got {t_offset_us} "
+                f"us; add {-t_offset_us} to all times"
+            )
         self.height, self.width = height, width
         self.span_us: tuple[int, int] | None = None
         """Start and stop of the time that was watched, which may be set until the file is whole."""
@@ -129,11 +138,17 @@ class EventWriter:
         if len(events) == 0:
             return
         first, last = int(events.t[0]), int(events.t[-1])
-        earliest = max(self._last_us, self._offset_us or 0, 0)
+        if first < 0:
+            raise ValueError(
+                f"Expected times of zero or more for {self.path}, got {first} us; add {-first} to "
+                "all of them, frames and labels alike"
+            )
+        earliest = max(self._last_us, self._offset_us or 0)
         if first < earliest:
             raise ValueError(
                 f"Expected events at or after {earliest} us for {self.path}, got {first} us; "
-                "append streams in time order, from zero or the given offset on"
+                f"append streams in time order, from the given offset on, or "
+                f"{backwards(earliest, first)}"
             )
         offset = first if self._offset_us is None else self._offset_us
         if last - offset > LONGEST_US:

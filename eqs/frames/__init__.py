@@ -1,8 +1,9 @@
 """Frames: what a clip is, how it is read, and how colour becomes grey."""
 
-from eqs.frames.checks import checked_frames, checked_times
+from eqs.frames.checks import WHITE, checked_frames, checked_times
 from eqs.frames.flow import FlowInterpolation
-from eqs.frames.folder import FrameFolder, image_paths, read_image
+from eqs.frames.folder import FrameFolder, image_paths
+from eqs.frames.image import IMAGE_SUFFIXES, image_size, read_image
 from eqs.frames.interpolation import (
     CachedInterpolation,
     Interpolation,
@@ -10,9 +11,12 @@ from eqs.frames.interpolation import (
     NetworkInterpolation,
 )
 from eqs.frames.luma import GreyImage, luma
+from eqs.frames.order import by_name
 from eqs.frames.video import VideoFile
 
 __all__ = [
+    "IMAGE_SUFFIXES",
+    "WHITE",
     "CachedInterpolation",
     "FlowInterpolation",
     "FrameFolder",
@@ -21,9 +25,11 @@ __all__ = [
     "LinearInterpolation",
     "NetworkInterpolation",
     "VideoFile",
+    "by_name",
     "checked_frames",
     "checked_times",
     "image_paths",
+    "image_size",
     "luma",
     "read_image",
 ]

@@ -7,11 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.clock import backwards
 
-def checked_frames(frames: Any) -> NDArray[Any]:  # noqa: ANN401 - whatever a caller has
+WHITE = 255.0
+
+
+def checked_frames(frames: Any, white: float = WHITE) -> NDArray[Any]:  # noqa: ANN401 - whatever a caller has
     """Return the frames as an array, uint8 or floating, grey `(N, H, W)` or RGB `(N, H, W, 3)`.
 
-    Convention: grey levels run from 0 to 255 in either type.
+    Convention: grey levels run from 0 to 255 in what is returned; floating ones that are given run
+    from 0 to `white`.
 
     Raises:
         ValueError: the sizes differ, or the type, shape or a value is none of a clip's.
@@ -33,17 +38,20 @@ def checked_frames(frames: Any) -> NDArray[Any]:  # noqa: ANN401 - whatever a ca
         )
     if 0 in array.shape[1:]:
         raise ValueError(f"Expected frames with at least one pixel, got {array.shape}")
+    if not 0 < white < np.inf:
+        raise ValueError(f"Expected a white level above 0, got {white!r}; set white=255")
     if array.dtype.kind == "f" and array.size:
-        _check_grey_levels(array)
+        _check_grey_levels(array, white)
+        array = array if white == WHITE else array * array.dtype.type(WHITE / white)
     return array
 
 
-def _check_grey_levels(array: NDArray[Any]) -> None:
+def _check_grey_levels(array: NDArray[Any], white: float) -> None:
     low, high = float(array.min()), float(array.max())
-    if not (low >= 0 and high <= 255):  # written so that NaN fails too
+    if not (low >= 0 and high <= white):  # written so that NaN fails too
         raise ValueError(
-            f"Expected finite grey levels from 0 to 255, got {low} to {high}; "
-            "clip the frames and replace NaN before simulating"
+            f"Expected finite grey levels from 0 to {white:g}, got {low} to {high}; "
+            "clip the frames and replace NaN before simulating, or set white"
         )
 
 
@@ -75,8 +83,10 @@ def checked_times(timestamps_us: Any, count: int) -> NDArray[np.int64]:  # noqa:
     back = np.flatnonzero(np.diff(times) <= 0)
     if len(back):
         at = int(back[0]) + 1
+        otherwise = "sort the frames by time and drop repeated ones"
+        advice = backwards(int(times[at - 1]), int(times[at]), otherwise)
         raise ValueError(
             f"Expected frame times that increase, got {times[at]} us after {times[at - 1]} us at "
-            f"frame {at}; sort the frames by time and drop repeated ones"
+            f"frame {at}; {advice}"
         )
     return times

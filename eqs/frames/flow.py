@@ -21,6 +21,7 @@ from eqs.frames.luma import luma
 Flow = NDArray[np.float32]
 TRUSTED_PX = 1.0  # forward and backward flow that disagree by more count little
 LEAST_TRUST = 1e-3
+LEAST_SIDE_PX = 16  # the search finds nothing in smaller images; their edges are repeated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,9 +86,13 @@ def optical_flow(first: Frame, second: Frame) -> Flow:
 
     grey = [frame if frame.ndim == 2 else luma(frame) for frame in (first, second)]
     grey = [np.rint(frame).astype(np.uint8) for frame in grey]
+    height, width = grey[0].shape
+    more = [(0, max(0, LEAST_SIDE_PX - side)) for side in (height, width)]
+    first_grey, second_grey = (np.pad(each, more, mode="edge") for each in grey)
     search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    start = np.zeros((*grey[0].shape, 2), np.float32)
-    return np.asarray(search.calc(grey[0], grey[1], start), np.float32)
+    start = np.zeros((*first_grey.shape, 2), np.float32)
+    found = np.asarray(search.calc(first_grey, second_grey, start), np.float32)
+    return np.ascontiguousarray(found[:height, :width])
 
 
 def moved(image: Frame, flow: Flow) -> Frame:

@@ -9,59 +9,41 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 
 from eqs.frames.checks import checked_times
-
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
-GREY_MODES = ("L", "1")
-COLOUR_MODES = ("RGB", "RGBA", "P")
+from eqs.frames.image import IMAGE_SUFFIXES, read_image
+from eqs.frames.order import frame_order
 
 
 def image_paths(folder: Path | str) -> list[Path]:
-    """The images of a folder in the order of their names.
+    """The images of a folder in the order of their numbers, see `frame_order`.
 
     Raises:
         FileNotFoundError: there is no such folder, or no image in it.
+        ValueError: their names admit two orders.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise FileNotFoundError(f"Expected a folder of frames, got {folder}, which is none")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
+    paths = [path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES]
     if not paths:
         raise FileNotFoundError(
             f"Expected images ({', '.join(IMAGE_SUFFIXES)}) in {folder}, got none"
         )
-    return paths
-
-
-def read_image(path: Path | str) -> NDArray[np.uint8]:
-    """Read an 8-bit image as grey `(H, W)` or RGB `(H, W, 3)`.
-
-    Raises:
-        ValueError: the file is no readable 8-bit image.
-    """
-    try:
-        with Image.open(path) as image:
-            if image.mode not in GREY_MODES + COLOUR_MODES:
-                raise ValueError(
-                    f"Expected an 8-bit grey or colour image, got mode {image.mode} in {path}; "
-                    "convert it to 8 bits first"
-                )
-            return np.asarray(image.convert("L" if image.mode in GREY_MODES else "RGB"))
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise ValueError(f"Expected a readable image, got {path}: {error}") from error
+    return frame_order(paths)
 
 
 class FrameFolder:
     """A clip on disk, read a few frames at a time.
 
-    Convention: frames come in the order of their file names and belong to the times in that order.
+    Convention: frames come in the order of the numbers in their names and belong to the times in
+    that order.
 
     Args:
-        folder: folder of images of one size, all grey or all in colour.
+        folder: folder of images of one size and depth, all grey or all in colour.
         timestamps_us: time of each frame, strictly increasing, int64 microseconds.
         chunk: frames to hold in memory at once.
+        white: level that is white in floating images.
 
     Raises:
         FileNotFoundError: the folder is missing or holds no image.
@@ -69,13 +51,17 @@ class FrameFolder:
     """
 
     def __init__(
-        self, folder: Path | str, timestamps_us: NDArray[np.int64], chunk: int = 8
+        self,
+        folder: Path | str,
+        timestamps_us: NDArray[np.int64],
+        chunk: int = 8,
+        white: float | None = None,
     ) -> None:
         """List the images and check that the times fit them."""
         if chunk < 1:
             raise ValueError(f"Expected at least one frame per chunk, got {chunk}; set chunk=8")
         self.paths = image_paths(folder)
-        self.chunk = chunk
+        self.chunk, self.white = chunk, white
         given = np.shape(timestamps_us)
         if given != (len(self.paths),):
             raise ValueError(
@@ -89,27 +75,33 @@ class FrameFolder:
         return len(self.paths)
 
     @cached_property
+    def first(self) -> NDArray[Any]:
+        """The first frame, which those that follow must be like."""
+        return read_image(self.paths[0], self.white)
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Shape of a frame, `(H, W)` grey or `(H, W, 3)` RGB, as the first image has it."""
-        return read_image(self.paths[0]).shape
+        return self.first.shape
 
     @property
     def duration_us(self) -> int:
         """Time from the first to the last frame."""
         return int(self.timestamps_us[-1] - self.timestamps_us[0])
 
-    def read(self, start: int, stop: int) -> NDArray[np.uint8]:
-        """Frames `[start, stop)` as one array.
+    def read(self, start: int, stop: int) -> NDArray[Any]:
+        """Frames `[start, stop)` as one array, uint8 or, where they are deeper, float32.
 
         Raises:
-            ValueError: an image cannot be read or differs in size or colour from the first.
+            ValueError: an image cannot be read or differs from the first in size, colour or depth.
         """
-        frames = [read_image(path) for path in self.paths[start:stop]]
+        frames = [read_image(path, self.white) for path in self.paths[start:stop]]
         for path, frame in zip(self.paths[start:stop], frames, strict=True):
-            if frame.shape != self.shape:
+            if (frame.shape, frame.dtype) != (self.shape, self.first.dtype):
                 raise ValueError(
-                    f"Expected frames of one size, got {frame.shape} in {path} after "
-                    f"{self.shape}; a clip is all grey or all RGB, of one height and width"
+                    f"Expected frames of one kind, got {frame.shape} of {frame.dtype} in {path} "
+                    f"after {self.shape} of {self.first.dtype}; a clip is all grey or all RGB, of "
+                    "one height, width and depth"
                 )
         return np.stack(frames)
 

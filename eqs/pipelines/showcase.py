@@ -40,8 +40,8 @@ class Showcase:
 
     @property
     def frame(self) -> NDArray[np.uint8]:
-        """The video frame of the instant."""
-        return self.recording.read_frame(self.index)
+        """The video frame of the instant, 8 bits deep."""
+        return np.rint(self.recording.read_frame(self.index)).astype(np.uint8)
 
     def events(self, source: EventSource, before_us: int = WINDOW_US) -> Events:
         """Events of one source up to the instant."""

@@ -71,14 +71,15 @@ def simulate_clip(simulator: Simulator, cfg: DictConfig) -> None:
         )
     if out.exists() and source.exists() and out.samefile(source):
         raise ValueError(f"Expected events beside the clip, got out={out} for both; set out")
-    clip = open_clip(source, cfg.frames_per_second)
-    check_duration(clip)
+    clip = open_clip(source, cfg.frames_per_second, cfg.white)
+    check_times(clip)
     description = {
         "simulator": simulator.name,
         "parameters": simulator.parameters(),
         "version": simulator.version,
         "sequence": out.stem,
         "frames": contents(clip),
+        "white": cfg.white,
     }
     record = out.with_name(out.name + ".json")
     if record.exists() and "description" not in read_json(record):
@@ -114,12 +115,17 @@ def refuse_others(out: Path, record: Path, description: Mapping[str, Any]) -> No
     )
 
 
-def check_duration(clip: FrameFolder | VideoFile) -> None:
+def check_times(clip: FrameFolder | VideoFile) -> None:
     """Refuse a clip whose events no file of DSEC's layout can hold, before it is simulated.
 
     Raises:
-        ValueError: it is too long.
+        ValueError: it is too long, or begins before zero.
     """
+    if isinstance(clip, FrameFolder) and clip.timestamps_us[0] < 0:
+        raise ValueError(
+            f"Expected frame times of zero or more, got {clip.timestamps_us[0]} us for the first "
+            f"frame; add {-clip.timestamps_us[0]} to every line of {TIMES}"
+        )
     if clip.duration_us > LONGEST_US:
         raise ValueError(
             f"Expected a clip of at most {LONGEST_US} us, which 32-bit times can count, got "
@@ -127,7 +133,9 @@ def check_duration(clip: FrameFolder | VideoFile) -> None:
         )
 
 
-def open_clip(source: Path, frames_per_second: float | None) -> FrameFolder | VideoFile:
+def open_clip(
+    source: Path, frames_per_second: float | None, white: float | None = None
+) -> FrameFolder | VideoFile:
     """A folder of images with its times, or a video with those it carries.
 
     The times of a folder are those in `timestamps.txt` in or beside it, whole microseconds, one a
@@ -145,7 +153,7 @@ def open_clip(source: Path, frames_per_second: float | None) -> FrameFolder | Vi
         return VideoFile(source)
     files = [folder / TIMES for folder in (source, source.parent) if (folder / TIMES).is_file()]
     if files and frames_per_second is None:
-        return FrameFolder(source, whole_numbers(files[0]).reshape(-1))
+        return FrameFolder(source, whole_numbers(files[0]).reshape(-1), white=white)
     if frames_per_second is None or not frames_per_second > 0:
         raise ValueError(
             f"Expected {TIMES} in {source} or beside it, or a frame rate above zero, got "
@@ -153,7 +161,7 @@ def open_clip(source: Path, frames_per_second: float | None) -> FrameFolder | Vi
         )
     count = len(image_paths(source))
     times = np.arange(count, dtype=np.int64) * 1_000_000 / frames_per_second
-    return FrameFolder(source, np.floor(times).astype(np.int64))
+    return FrameFolder(source, np.floor(times).astype(np.int64), white=white)
 
 
 def write_events(simulator: Simulator, clip: FrameFolder | VideoFile, out: Path) -> tuple[int, int]:

@@ -80,27 +80,37 @@ class Simulator:
             values.pop("seed", None)
         return values
 
-    def start(self, sequence: str = "") -> Stream:
+    def start(self, sequence: str = "", white: float | None = None) -> Stream:
         """A stream that takes the frames in chunks of any size.
 
         Args:
+            white: level that is white in floating frames. Untold it is 255, and a clip that is
+                nowhere brighter than 1 is refused at its end, since it must have meant another.
             sequence: name of the recording. Noise over time differs between names; what belongs
                 to the sensor, as the mismatch of its thresholds, does not.
         """
-        return Stream(self, sequence)
+        return Stream(self, sequence, white)
 
-    def simulate(self, frames: NDArray[Any], timestamps_us: Any, sequence: str = "") -> Events:  # noqa: ANN401
+    def simulate(
+        self,
+        frames: NDArray[Any],
+        timestamps_us: Any,  # noqa: ANN401
+        sequence: str = "",
+        white: float | None = None,
+    ) -> Events:
         """The events of a whole clip, with the time from its first to its last frame as their span.
 
         Args:
             frames: `(N, H, W)` grey or `(N, H, W, 3)` RGB, uint8 or floating, levels 0..255.
             timestamps_us: time of each frame, strictly increasing, int64 microseconds.
             sequence: name of the recording, see `start`.
+            white: level that is white in floating frames, see `start`.
 
         Raises:
-            ValueError: the clip has fewer than two frames, or is none.
+            ValueError: the clip has fewer than two frames, or is none, or its levels run to 1
+                where nobody said that 1 is white.
         """
-        stream = self.start(sequence)
+        stream = self.start(sequence, white)
         events = Events.concatenate([stream.step(frames, timestamps_us), stream.finish()])
         return replace(events, span_us=stream.span_us)
 

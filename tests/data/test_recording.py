@@ -139,7 +139,10 @@ def labels_alone(folder):
         (labels_alone, "timestamps.txt beside the labels of .*found none"),
         (remove_times, "timestamps.txt beside the 6 frames of .*found none"),
         (one_time_less, "one timestamp per frame .*got 2 lines .* and 6 frames"),
-        (backwards, "rising times of zero or more"),
+        (
+            backwards,
+            "times that increase, got 4 us after 5 us .*sort the frames .*timestamps",
+        ),
         (no_numbers, "whole microseconds in .*timestamps.txt"),
         (one_frame, "at least two frames .*got one"),
         (broken_image, "image at .*000000.png"),

@@ -275,10 +275,25 @@ def test_writer_refuses_what_the_layout_cannot_hold(tmp_path, make_events):
         write(events, events)
     with pytest.raises(ValueError, match="at or after 8000 us"):
         write(events, t_offset_us=8_000)
-    with pytest.raises(ValueError, match="at or after 0 us"):
+    with pytest.raises(ValueError, match=r"times of zero or more for .*; add 990 to all of them"):
         write(events.shifted(-6_000))
     with pytest.raises(ValueError, match=r"of a 32x24 sensor .*got 9x9"):
         write(Events.empty(9, 9))
     with pytest.raises(ValueError, match="recording of at most 4294967295 us"):
         write(Events.concatenate([events, events.shifted(2**32)]))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_clock_that_began_again_is_to_be_unwrapped(tmp_path):
+    t = np.array([2**32 - 20, 2**32 - 10, 5, 15], np.int64)
+    ones = np.zeros(4, int)
+    with pytest.raises(ValueError, match=r"unwrap the clock, which began again at 2\^32: add 4"):
+        Events.from_arrays(t, ones, ones, ones, height=2, width=2)
+    for times, advice in ((t, "unwrap the clock"), (np.array([15, 5, 3, 1]), "sort the stream")):
+        path = tmp_path / "e.h5"
+        with h5py.File(path, "w") as file:
+            for name, values in {"t": times, "x": ones, "y": ones, "p": ones}.items():
+                file[f"events/{name}"] = values.astype(np.uint32)
+            file["ms_to_idx"] = np.zeros(2, np.uint64)
+        with pytest.raises(ValueError, match=advice):
+            EventReader(path, height=2, width=2).read()

@@ -126,3 +126,11 @@ def test_factors_that_make_no_sense_are_refused(kind, factor):
         kind(factor=factor)
     with pytest.raises(ValueError, match="largest_step_px above 0"):
         FlowInterpolation(largest_step_px=0)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (5, 7), (11, 300), (300, 3), (12, 12)])
+def test_flow_takes_frames_of_any_size(shape):
+    first = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
+    made = FlowInterpolation(factor=3).between(first, first)
+    assert made.shape == (2, *shape)
+    np.testing.assert_allclose(made, np.stack([first, first]), atol=1e-3)

@@ -1,5 +1,6 @@
 """One clip to one event file, as scripts/simulate.py does it."""
 
+import os
 import re
 from pathlib import Path
 
@@ -140,3 +141,87 @@ def test_a_clip_or_a_data_set_is_wanted(caplog, overrides, found):
     with pytest.raises(SystemExit):
         simulate(cfg)
     assert f"Expected a clip or a data set, got {found}; set frames or data" in caplog.text
+
+
+def test_what_is_not_provably_ours_is_left_alone(clip, tmp_path, caplog):
+    folder, _ = clip
+    out = tmp_path / "events.h5"
+    out.write_bytes(b"recorded by somebody")
+    with pytest.raises(SystemExit):
+        run(folder, out, "frames_per_second=30")
+    assert "got a file that this command did not write" in caplog.messages[-1]
+    assert out.read_bytes() == b"recorded by somebody"
+    run(folder, out, "frames_per_second=30", "overwrite=true")
+    made = out.read_bytes()
+    out.write_bytes(b"recorded again")  # beside the record of what was made
+    with pytest.raises(SystemExit):
+        run(folder, out, "frames_per_second=30")
+    assert out.read_bytes() == b"recorded again"
+    (tmp_path / "labels.h5.json").write_text('{"mine": 1}')
+    with pytest.raises(SystemExit):
+        run(folder, tmp_path / "labels.h5", "frames_per_second=30")
+    assert (tmp_path / "labels.h5.json").read_text() == '{"mine": 1}'
+    run(folder, out, "frames_per_second=30", "overwrite=true")
+    assert out.read_bytes() == made
+
+
+@pytest.mark.parametrize("change", ["frame", "times"])
+def test_changed_frames_and_times_are_other_events(clip, tmp_path, caplog, change):
+    folder, frames = clip
+    (tmp_path / "timestamps.txt").write_text("\n".join(map(str, range(0, 200_000, 10_000))))
+    run(folder, tmp_path / "events.h5")
+    path = folder / "003.png"
+    before = path.stat()
+    if change == "frame":
+        content = path.read_bytes()
+        path.write_bytes((folder / "004.png").read_bytes().ljust(len(content), b"\0"))
+        os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    else:
+        (tmp_path / "timestamps.txt").write_text("\n".join(map(str, range(0, 400_000, 20_000))))
+    with pytest.raises(SystemExit):
+        run(folder, tmp_path / "events.h5")
+    assert "got events made of other frames or with other parameters" in caplog.messages[-1]
+
+
+def test_a_folder_is_no_file_and_a_clip_no_place_for_its_events(clip, tmp_path, caplog):
+    folder, _ = clip
+    for out in (tmp_path, folder):
+        with pytest.raises(SystemExit):
+            run(folder, out, "frames_per_second=30")
+        assert f"a file to write at {out}, got a folder; set out" in caplog.messages[-1]
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        (range(-10_000, 190_000, 10_000), "zero or more, got -10000 us .*; add 10000 to every"),
+        (range(0, 20 * 300_000_000, 300_000_000), "at most 4294967295 us, .* got 5700000000 us"),
+        ([*range(2**32 - 19, 2**32), 5], "unwrap the clock"),
+    ],
+)
+def test_times_that_no_file_can_hold_are_refused_before_the_work(
+    clip, tmp_path, caplog, times, said
+):
+    folder, _ = clip
+    (tmp_path / "timestamps.txt").write_text("\n".join(map(str, times)))
+    with pytest.raises(SystemExit):
+        run(folder, tmp_path / "events.h5")
+    assert re.search(said, caplog.messages[-1])
+    assert list(tmp_path.glob("events*")) == []
+
+
+def test_floating_images_say_what_is_white(clip, tmp_path, caplog):
+    folder, frames = clip
+    plain = tmp_path / "plain.h5"
+    run(folder, plain, "frames_per_second=30")
+    for index, frame in enumerate(frames):
+        (folder / f"{index:03d}.png").unlink()
+        Image.fromarray(frame.astype(np.float32) / 255).save(folder / f"{index:03d}.tif")
+    with pytest.raises(SystemExit):
+        run(folder, tmp_path / "float.h5", "frames_per_second=30")
+    assert "set white=1" in caplog.messages[-1]
+    run(folder, tmp_path / "float.h5", "frames_per_second=30", "white=1")
+    # Rounded thirds of a level aside, the events are those of the bytes.
+    assert len(Events.load(tmp_path / "float.h5")) == pytest.approx(
+        len(Events.load(plain)), rel=0.01
+    )

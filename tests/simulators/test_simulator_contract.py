@@ -326,3 +326,31 @@ def test_an_hour_keeps_its_microseconds():
     minutes = events.window(int(times[118]), int(times[119]) + 1)
     expected = times[118] + np.floor(30e6 * np.arange(1, 4) * 0.2 / np.log(2))
     np.testing.assert_array_equal(minutes.t[-3:], expected)
+
+
+def ramp(levels: int = 5) -> np.ndarray:
+    return np.linspace(0.1, 1, levels)[:, None, None] * np.ones((levels, 4, 6))
+
+
+def test_a_clip_that_takes_one_for_white_is_refused_until_it_says_so():
+    frames, times = ramp(), np.arange(5) * 50_000
+    with pytest.raises(ValueError, match="none brighter than 1; set white=1 if 1 is white, or whi"):
+        ESIM().simulate(frames, times)
+    scaled = ESIM().simulate(255 * frames, times)
+    assert len(scaled) > 0
+    assert_same(ESIM().simulate(frames, times, white=1), scaled)
+    assert_same(ESIM().simulate(np.float32(255) * frames, times, white=255), scaled)
+
+
+def test_a_dark_chunk_of_a_bright_clip_is_no_mistake():
+    frames, times = 255 * ramp(), np.arange(5) * 50_000
+    frames[:2] = 0.5
+    stream = ESIM().start()
+    parts = [stream.step(frames[k : k + 2], times[k : k + 2]) for k in (0, 2)]
+    parts += [stream.step(frames[4:], times[4:]), stream.finish()]
+    assert_same(Events.concatenate(parts), ESIM().simulate(frames, times))
+
+
+def test_levels_above_white_are_refused():
+    with pytest.raises(ValueError, match=r"levels from 0 to 1, got 0.2 to 2.0; .* or set white"):
+        ESIM().simulate(2 * ramp(), np.arange(5), white=1)

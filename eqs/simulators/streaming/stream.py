@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import GreyImage, Interpolation, checked_frames, checked_times
+from eqs.frames import WHITE, GreyImage, Interpolation, checked_frames, checked_times
 from eqs.processors import useful_bands
 from eqs.simulators.streaming.bands import BandedPixels
 from eqs.simulators.streaming.keys import MAX_PIXELS, MAX_TIME_US, ReorderBuffer, events_of, ordered
@@ -48,9 +48,11 @@ class Stream:
     are divided into chunks. A stream can be pickled between steps and go on elsewhere.
     """
 
-    def __init__(self, simulator: Model, sequence: str) -> None:
+    def __init__(self, simulator: Model, sequence: str, white: float | None = None) -> None:
         """See `Simulator.start`."""
         self.simulator = simulator
+        self.white = white
+        self._brightest = 0.0  # of floating frames whose white level nobody told
         self.sequence = sequence
         self._pixels: Pixels | None = None
         self._buffer = ReorderBuffer()
@@ -71,7 +73,9 @@ class Stream:
         """
         if self._finished:
             raise ValueError("Expected frames before the end, got some after finish(); start anew")
-        array = checked_frames(frames)
+        array = checked_frames(frames, WHITE if self.white is None else self.white)
+        if self.white is None and array.dtype.kind == "f":
+            self._brightest = max(self._brightest, float(array.max(initial=0)))
         times = checked_times(timestamps_us, len(array))
         self._check_continues(array.shape[1:3], times)
         # One frame's events are put in order while the pixels already see the next frame.
@@ -107,12 +111,18 @@ class Stream:
         """End the sequence and give the events that were held back.
 
         Raises:
-            ValueError: fewer than two frames were seen, or the readout is far too slow.
+            ValueError: fewer than two frames were seen, floating ones seem to take 1 for white, or
+                the readout is far too slow.
         """
         if self._frames_seen < 2:
             raise ValueError(
                 f"Expected a clip of at least two frames, got {self._frames_seen}; events arise "
                 "between frames"
+            )
+        if 0 < self._brightest <= 1:
+            raise ValueError(
+                f"Expected floating frames with grey levels from 0 to 255, got none brighter than "
+                f"{self._brightest:g}; set white=1 if 1 is white, or white=255 if it was that dark"
             )
         self._finished = True
         keys = self._buffer.flush()

@@ -174,7 +174,8 @@ def test_no_latency_is_above_ten_milliseconds_in_the_dark():
     frames = np.array([0.0, 0.3, 0.3])[:, None, None]
     dark = CLEAN | {"white_lux": 255.0, "time_constant_us": 40.0}
     for mode in ("fixed", "faithful"):
-        events = ICNS(**dark, threshold_on_log=0.2, mode=mode).simulate(frames, [0, 30_000, 90_000])
+        model = ICNS(**dark, threshold_on_log=0.2, mode=mode)
+        events = model.simulate(frames, [0, 30_000, 90_000], white=255)
         assert len(events) == 1
         assert events.p[0] == 1
     assert events.t[0] == 40_000  # it came 44 ms after the light, 14 ms into the second step

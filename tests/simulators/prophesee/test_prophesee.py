@@ -88,8 +88,9 @@ def test_faithful_shot_noise_needs_motion_and_is_shared_out_among_levels():
 
 def test_black_flicker_drowns_faithful_pixels_alone():
     frames, times = np.arange(6)[:, None, None] % 2 * np.ones((6, 2, 2)), np.arange(6) * 50_000
-    assert len(Prophesee(**CLEAN).simulate(frames, times)) == 0
-    faithful = Prophesee(**CLEAN, threshold_on_log=0.2, mode="faithful").simulate(frames, times)
+    assert len(Prophesee(**CLEAN).simulate(frames, times, white=255)) == 0
+    model = Prophesee(**CLEAN, threshold_on_log=0.2, mode="faithful")
+    faithful = model.simulate(frames, times, white=255)
     step = math.log((1e-7 + 1 / 255) / 1e-7)
     assert len(faithful.window(0, 50_000)) == 4 * math.floor(step / 0.2)
 
