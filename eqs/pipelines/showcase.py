@@ -41,7 +41,8 @@ class Showcase:
     @property
     def frame(self) -> NDArray[np.uint8]:
         """The video frame of the instant, 8 bits deep."""
-        return np.rint(self.recording.read_frame(self.index)).astype(np.uint8)
+        frame: NDArray[np.uint8] = np.rint(self.recording.read_frame(self.index)).astype(np.uint8)
+        return frame
 
     def events(self, source: EventSource, before_us: int = WINDOW_US) -> Events:
         """Events of one source up to the instant."""

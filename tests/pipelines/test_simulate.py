@@ -167,7 +167,7 @@ def test_what_is_not_provably_ours_is_left_alone(clip, tmp_path, caplog):
 
 @pytest.mark.parametrize("change", ["frame", "times"])
 def test_changed_frames_and_times_are_other_events(clip, tmp_path, caplog, change):
-    folder, frames = clip
+    folder, _ = clip
     (tmp_path / "timestamps.txt").write_text("\n".join(map(str, range(0, 200_000, 10_000))))
     run(folder, tmp_path / "events.h5")
     path = folder / "003.png"
