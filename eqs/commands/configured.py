@@ -66,6 +66,7 @@ CONFIGURED = {
     "score": Configured(
         config="score", module="score_files", pipeline="score_files", translate=with_files
     ),
+    "check": Configured(config="check", module="check", pipeline="check"),
     "calibrate": Configured(config="calibrate", module="calibrate", pipeline="calibrate"),
 }
 

@@ -85,7 +85,19 @@ class DSECFolder:
         root = Path(self.root)
         if self.generator is not None:
             self.generator.generate(root)
-        _existing_sequences(root)
+        found = _existing_sequences(root)
+        for split, patterns in self.splits.items():
+            for pattern in patterns:
+                if not any(fnmatchcase(name, pattern) for name in found):
+                    log.warning("%s has no sequence %s of the %s split", root, pattern, split)
+
+    def folders(self) -> dict[str, list[Path]]:
+        """The folders of the sequences of each split, which may be none."""
+        found = _existing_sequences(Path(self.root))
+        return {
+            split: [path for name, path in found.items() if any(fnmatchcase(name, p) for p in each)]
+            for split, each in self.splits.items()
+        }
 
     def recordings(self, split: str) -> list[Recording]:
         """The recordings of one split, by name.
@@ -98,19 +110,18 @@ class DSECFolder:
                 f"Expected one of the splits {', '.join(self.splits)}, got {split!r}; "
                 "set data.splits"
             )
-        patterns = list(self.splits[split])
-        found = _existing_sequences(Path(self.root))
-        chosen = [name for name in found if any(fnmatchcase(name, each) for each in patterns)]
+        chosen = self.folders()[split]
         if not chosen:
+            found = ", ".join(_existing_sequences(Path(self.root)))
             raise ValueError(
-                f"Expected sequences named {', '.join(patterns)} for the {split} split in "
-                f"{self.root}, got {', '.join(found)}; set data.root or data.splits"
+                f"Expected sequences named {', '.join(self.splits[split])} for the {split} split "
+                f"in {self.root}, got {found}; set data.root or data.splits"
             )
-        for pattern in patterns:
-            if not any(fnmatchcase(name, pattern) for name in found):
-                log.warning("%s has no sequence %s of the %s split", self.root, pattern, split)
-        rows, columns = parse_size(self.size)
-        return [Recording.load(found[name], rows, columns) for name in chosen]
+        return [self.load(folder) for folder in chosen]
+
+    def load(self, folder: Path) -> Recording:
+        """The recording in a folder, of the sensor's size."""
+        return Recording.load(folder, *parse_size(self.size))
 
     def all_recordings(self) -> list[Recording]:
         """The recordings of every split."""
@@ -172,7 +183,15 @@ class RecordingFolder:
                 f"Expected recordings with frames and events in {self.root}, got none ({reasons}); "
                 "set data.root"
             )
-        return [Recording.load(path) for name, path in found.items() if name not in skipped]
+        return [self.load(path) for name, path in found.items() if name not in skipped]
+
+    def folders(self) -> dict[str, list[Path]]:
+        """The folders of all recordings, those that are left out among them."""
+        return {"test": list(_existing_sequences(Path(self.root)).values())}
+
+    def load(self, folder: Path) -> Recording:
+        """The recording in a folder, of its own size."""
+        return Recording.load(folder)
 
     def all_recordings(self) -> list[Recording]:
         """All recordings with frames and events."""

@@ -108,6 +108,11 @@ class EventReader:
         """The span or, where the file says none, that of the events; None without either."""
         return self.span_us or ((self.start_us, self.stop_us) if len(self) else None)
 
+    def longest_silence_us(self) -> int:
+        """The longest time between two events, in whole milliseconds of the file's index."""
+        changes = np.flatnonzero(np.diff(self._opened().index))
+        return 1000 * int(np.diff(changes).max(initial=1) - 1)
+
     def __len__(self) -> int:
         """Number of events in the file."""
         return self._opened().count

@@ -58,7 +58,7 @@ def check_seed(cfg: DictConfig) -> None:
     Raises:
         ValueError: the seed is not a whole number of 32 bits.
     """
-    if not isinstance(cfg.seed, int) or not 0 <= cfg.seed < 2**32:
+    if "seed" in cfg and (not isinstance(cfg.seed, int) or not 0 <= cfg.seed < 2**32):
         raise ValueError(
             f"Expected seed to be a whole number from 0 to {2**32 - 1}, got {cfg.seed!r}; set seed"
         )

@@ -9,7 +9,6 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from eqs.content import content_hash
-from eqs.data import DSECFolder
 from eqs.files import short_hash
 from eqs.pipelines.build import Dataset
 
@@ -68,10 +67,12 @@ def recipe_hash(cfg: DictConfig) -> str:
 
 def data_hash(data: Dataset) -> str:
     """Hash of what every recording holds, frames, times, labels and events, split by split."""
-    if not isinstance(data, DSECFolder):
-        return short_hash([each.content_hash() for each in data.recordings()])
-    splits = {split: data.recordings(split) for split in data.splits}
-    return short_hash({name: [each.content_hash() for each in s] for name, s in splits.items()})
+    return short_hash(
+        {
+            split: [data.load(folder).content_hash() for folder in folders]
+            for split, folders in data.folders().items()
+        }
+    )
 
 
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:

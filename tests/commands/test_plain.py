@@ -52,7 +52,7 @@ def test_unfinished_trainings_are_named(tmp_path):
         "recipe": {"epochs": 2},
         "task": {"optimizer": {"lr": 0.1}},
     }
-    run.save_config(OmegaConf.create(config))
+    run.save_config(OmegaConf.create(config), {})
     assert settings(run) == {"model.size": "tiny", "recipe.epochs": 2, "task.optimizer.lr": 0.1}
     for command, arguments in ((compare, []), (watch, [str(tmp_path), str(tmp_path / "a.gif")])):
         with pytest.raises(SystemExit, match=r"Expected (a )?finished training"):
