@@ -103,8 +103,10 @@ class SimulatedEvents:
             return
         description = f"simulating {self.simulator.name}"
         with one_at_a_time(self.root / self.label, description):
-            missing = self._missing(recordings)  # fewer, if another process was at it
-            done = side_by_side(self.simulate, missing, min(self.workers, len(missing)) or 1)
+            missing = self._missing(recordings)
+            if not missing:  # another process was at it
+                return
+            done = side_by_side(self.simulate, missing, min(self.workers, len(missing)))
             for _ in track(done, description=description, total=len(missing)):
                 pass
 

@@ -134,6 +134,8 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     tried = trials(cfg)
     if tried:
         log.warning("a trial, because of %s: it leaves no result", ", ".join(tried))
+        for stream, accuracy in task.measured.items():
+            log.info("%s: mAP %.1f of what was looked at", stream, 100 * accuracy.map)
         return False
     finish(job, trainer, task, seconds, times)
     return True

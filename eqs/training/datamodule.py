@@ -145,6 +145,7 @@ class EventDataModule(lightning.LightningDataModule):
         self.steps_per_epoch, self.epochs = steps_per_epoch, epochs
         self.stream_share, self.augmentation = stream_share, augmentation
         self.evaluation_length, self.num_workers = evaluation_length, num_workers
+        self._looked = False
 
     def prepare_data(self) -> None:
         """Open every event file before the first step, so that no fault waits for the last test.
@@ -157,6 +158,8 @@ class EventDataModule(lightning.LightningDataModule):
             ValueError: an event file is damaged or runs on another clock than its frames, labels
                 belong to no frame, or the test recordings have no boxes.
         """
+        if self._looked:  # the trainer asks again before it tests
+            return
         streams = [("train", "train", self.source), ("val", "val", self.source)]
         streams += [("test", f"test ({name})", events) for name, events in self.tests.items()]
         for split, named, events in streams:
@@ -167,6 +170,7 @@ class EventDataModule(lightning.LightningDataModule):
                 check_boxes(sources)
             for sentence in said_of(sources):
                 log.warning("%s: %s", named, sentence)
+        self._looked = True
 
     def training_dataset(self, rank: int = 0, world_size: int = 1) -> TrainingDataset:
         """The training batches of one process."""

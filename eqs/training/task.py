@@ -97,8 +97,8 @@ class DetectionTask(lightning.LightningModule):
         rate = self.trainer.optimizers[0].param_groups[0]["lr"]
         raise ValueError(
             f"Expected a finite loss, got {', '.join(broken) or 'another process without one'} at "
-            f"step {self.trainer.global_step} with a learning rate of {rate:.3g}; set "
-            "recipe.learning_rate lower or trainer.precision=32-true, last.ckpt is as it was"
+            f"step {self.trainer.global_step} with a learning rate of {rate:.3g} (last.ckpt is as "
+            "it was); set recipe.learning_rate lower or trainer.precision=32-true"
         )
 
     def on_validation_epoch_start(self) -> None:
