@@ -44,6 +44,14 @@ def run(verb: str, arguments: Sequence[str] | None = None, shown: str | None = N
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     shown = shown or f"python {sys.argv[0]}"
+    try:
+        _run(verb, arguments, shown)
+    except KeyboardInterrupt:  # before or after the work, which says more about itself
+        sys.stderr.write("\ninterrupted; type the same command again\n")
+        sys.exit(130)
+
+
+def _run(verb: str, arguments: Sequence[str], shown: str) -> None:
     if verb in PLAIN:
         try:
             with needed("all", f"for eqs {verb}"):

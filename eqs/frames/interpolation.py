@@ -162,15 +162,29 @@ def stacked(like: Frame, made: list[Frame]) -> NDArray[np.float32]:
     return np.clip(frames, 0, 255).astype(np.float32)
 
 
-@lru_cache(maxsize=8)
 def network_sha256(path: Path) -> str:
     """Digest of a network's file, read once: the cache asks for it with every pair of frames."""
+    return _sha256(path, *_times(path))
+
+
+def scripted(path: Path) -> Callable[[Frame, Frame, float], Frame]:
+    """A TorchScript file as a function of frames, loaded once."""
+    return _loaded(path, *_times(path))
+
+
+def _times(path: Path) -> tuple[int, int]:
+    """What changes with a file, so that another under its name is not taken for it."""
+    found = path.stat()
+    return found.st_mtime_ns, found.st_size
+
+
+@lru_cache(maxsize=8)
+def _sha256(path: Path, *_: int) -> str:
     return file_sha256(path)
 
 
 @lru_cache(maxsize=2)
-def scripted(path: Path) -> Callable[[Frame, Frame, float], Frame]:
-    """A TorchScript file as a function of frames, loaded once."""
+def _loaded(path: Path, *_: int) -> Callable[[Frame, Frame, float], Frame]:
     import torch  # only those who bring a network need it here
 
     network = torch.jit.load(str(path), map_location="cpu").eval()

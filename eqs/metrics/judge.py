@@ -73,16 +73,16 @@ class Judge:
         return cls._of_rvt(untrained_backbone(built, seed), built, "random weights, a control")
 
     @classmethod
-    def from_checkpoint(cls, path: Path | str, partition_split_32: int = 2) -> Self:
+    def from_checkpoint(cls, path: Path | str, partition_split_32: int | None = None) -> Self:
         """A judge without centres from a detector's checkpoint, whose scores are raw.
 
         Args:
             path: checkpoint of an RVT detector trained on real events.
-            partition_split_32: as it was trained; no checkpoint says so.
+            partition_split_32: as it was trained; None for what the checkpoint knows, or else 2.
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: the file holds no detector of a known size.
+            ValueError: the file holds no detector of a known size, or one of another partition.
         """
         backbone, shape = trained_backbone(path, partition_split_32)
         return cls._of_rvt(backbone, shape, f"weights of {Path(path).name}")

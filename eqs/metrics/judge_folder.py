@@ -14,6 +14,7 @@ from eqs.metrics.centre import Centre
 from eqs.metrics.definition import Definition
 from eqs.metrics.network import RVTShape, trained_backbone, weights_sha256
 from eqs.models import RVTBackbone
+from eqs.models.checkpoint import GEOMETRY
 
 RECORD, WEIGHTS = "judge.json", "weights.ckpt"
 
@@ -68,6 +69,7 @@ def write_judge(
     digest = weights_sha256(backbone)
     if not _holds(folder / WEIGHTS, digest, shape):
         weights = {f"backbone.{name}": x.cpu() for name, x in backbone.state_dict().items()}
+        weights[GEOMETRY] = shape.partition_split_32
         with complete_file(folder / WEIGHTS) as partial:
             torch.save(weights, partial)
     for centre in centres:

@@ -44,20 +44,22 @@ def untrained_backbone(shape: RVTShape, seed: int = 0) -> RVTBackbone:
     return model.backbone.eval().requires_grad_(False)
 
 
-def trained_backbone(path: Path | str, partition_split_32: int) -> tuple[RVTBackbone, RVTShape]:
+def trained_backbone(
+    path: Path | str, partition_split_32: int | None
+) -> tuple[RVTBackbone, RVTShape]:
     """The frozen backbone of a checkpoint, and its shape.
 
     Args:
         path: checkpoint of a detector, or of a backbone under the detector's names.
-        partition_split_32: as it was trained; no checkpoint says so.
+        partition_split_32: as it was trained; None for what the file knows, or else 2.
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: the file holds no backbone of a known size.
+        ValueError: the file holds no backbone of a known size, or one of another partition.
     """
     backbone, size = backbone_from_checkpoint(path, partition_split_32)
     bins = backbone.in_channels // 2
-    shape = RVTShape(size=size, bins=bins, partition_split_32=partition_split_32)
+    shape = RVTShape(size=size, bins=bins, partition_split_32=backbone.partition_split_32)
     return backbone.eval().requires_grad_(False), shape
 
 

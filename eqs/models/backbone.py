@@ -136,6 +136,7 @@ class RVTBackbone(nn.Module):
         """Build stages of 1, 2, 4 and 8 times `embed_dim` channels."""
         super().__init__()
         self.in_channels = in_channels
+        self.partition_split_32 = partition_split_32
         self.multiple = STRIDES[-1] * partition_split_32
         self.widths = [embed_dim * factor for factor in (1, 2, 4, 8)]
         self.stages = nn.ModuleList(

@@ -14,6 +14,8 @@ CLASS_BIAS = "yolox_head.cls_preds.0.bias"
 CLASS_LAYERS = "yolox_head.cls_preds."
 LISTED = 5
 KEYS = "model.weights"
+GEOMETRY = "partition_split_32"  # under which our own checkpoints keep it
+PUBLISHED_SPLIT = 2
 RESUMED = {"state_dict", "optimizer_states", "lr_schedulers", "pytorch-lightning_version"}
 
 
@@ -40,6 +42,29 @@ def read_weights(path: str | Path, key: str = KEYS) -> dict[str, Tensor]:
         ValueError: not a checkpoint, no detector in it, or several.
     """
     return _detector_in(_content(path, key), path, key)
+
+
+def partition_of(path: str | Path, given: int | None, key: str = KEYS) -> int:
+    """Attention windows per side of the last stage with which a checkpoint was trained.
+
+    No shape of a weight tells it, and with another the network computes something else.
+
+    Args:
+        path: checkpoint file; those written here know it.
+        given: what the caller says; None for what the file knows, or else 2, as published.
+        key: configuration key to name in errors.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: not a checkpoint, or the file knows another.
+    """
+    stored = _content(path, key).get(GEOMETRY)
+    if given is not None and stored not in (None, given):
+        raise ValueError(
+            f"Expected partition_split_32={stored}, with which {path} was trained, got {given}; "
+            "leave eqs.partition_split_32 out"
+        )
+    return next((int(each) for each in (given, stored) if each is not None), PUBLISHED_SPLIT)
 
 
 def _content(path: str | Path, key: str) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from eqs.models.checkpoint import (
     STEM,
     check_entries,
     load_weights,
+    partition_of,
     read_weights,
     shape_of,
 )
@@ -116,7 +117,7 @@ class RVTDetector(nn.Module):
         cls,
         path: str | Path,
         num_classes: int | None = None,
-        partition_split_32: int = 2,
+        partition_split_32: int | None = None,
         new_class_branch: bool = False,
     ) -> RVTDetector:
         """Build the detector that a checkpoint's shapes describe and load it strictly.
@@ -124,20 +125,20 @@ class RVTDetector(nn.Module):
         Args:
             path: a published Lightning checkpoint, one of ours, or a plain state dict.
             num_classes: classes wanted; None takes the checkpoint's.
-            partition_split_32: as in the constructor; no checkpoint stores it.
+            partition_split_32: as in the constructor; by default what the checkpoint knows, or 2.
             new_class_branch: start the class layers anew where `num_classes` differs.
 
         Raises:
             FileNotFoundError: no such file.
-            ValueError: not a detector of a known size, missing or unexpected entries, or another
-                number of classes.
+            ValueError: not a detector of a known size, missing or unexpected entries, another
+                number of classes, or another partition than the checkpoint's.
         """
         found = shape_of(read_weights(path), path)
         return cls(
             size_of_width(found.embed_dim, path),
             num_classes=found.num_classes if num_classes is None else num_classes,
             in_channels=found.in_channels,
-            partition_split_32=partition_split_32,
+            partition_split_32=partition_of(path, partition_split_32),
             weights=path,
             new_class_branch=new_class_branch,
         )
@@ -217,17 +218,18 @@ def size_of_width(embed_dim: int, path: str | Path) -> str:
 
 
 def backbone_from_checkpoint(
-    path: str | Path, partition_split_32: int = 2
+    path: str | Path, partition_split_32: int | None = None
 ) -> tuple[RVTBackbone, str]:
     """The backbone alone, loaded strictly, and its size.
 
     Args:
         path: checkpoint of a detector, or of a backbone under the detector's names.
-        partition_split_32: as in the constructor; no checkpoint stores it.
+        partition_split_32: as in the constructor; by default what the checkpoint knows, or 2.
 
     Raises:
         FileNotFoundError: no such file.
-        ValueError: not a backbone of a known size, missing or unexpected entries.
+        ValueError: not a backbone of a known size, missing or unexpected entries, or another
+            partition than the checkpoint's.
     """
     stem = "backbone."
     weights = {
@@ -237,7 +239,8 @@ def backbone_from_checkpoint(
     }
     embed_dim, in_channels = weights[STEM.removeprefix(stem)].shape[:2]
     size = size_of_width(embed_dim, path)
-    backbone = RVTBackbone(in_channels, embed_dim, SIZES[size].head_dim, partition_split_32)
+    partition = partition_of(path, partition_split_32, "eqs.judge")
+    backbone = RVTBackbone(in_channels, embed_dim, SIZES[size].head_dim, partition)
     check_entries(backbone.state_dict(), weights, path, "eqs.judge to another file")
     backbone.load_state_dict(weights)
     return backbone, size

@@ -17,6 +17,11 @@ from eqs.training import IDENTITY
 
 log = logging.getLogger(__name__)
 LISTED = 4  # differences that a sentence names
+# Settings that follow from the number of epochs.
+FOLLOW_EPOCHS = {
+    "total_steps", "recipe.epochs", "datamodule.epochs", "trainer.max_epochs",
+    "task.scheduler.total_steps",
+}  # fmt: skip
 # What an identity says beside the recipe.
 NAMED_APART = ("stream", "data", "seed", "total_steps")
 
@@ -41,7 +46,7 @@ def checkpoint_path(
         model: the detector that is trained.
 
     Raises:
-        FileNotFoundError: the given checkpoint, or that of the shorter training, does not exist.
+        FileNotFoundError: that of the shorter training does not exist.
         ValueError: the checkpoint belongs to another training, or is none.
     """
     own = run.last_checkpoint
@@ -51,8 +56,6 @@ def checkpoint_path(
         return own
     if cfg.ckpt_path not in (None, "last"):
         path = Path(cfg.ckpt_path)
-        if not path.is_file():
-            raise FileNotFoundError(f"Expected a checkpoint at {path}, found none; set ckpt_path")
         compare(path, check_resumable(model, path), identity)
         return path
     if shorter is not None:
@@ -64,7 +67,39 @@ def checkpoint_path(
             )
         compare(path, check_resumable(model, path), identity_of_shorter(cfg, identity))
         return path
+    for other in shorter_ones(run, identity):
+        log.warning(
+            "beginning anew; %s holds the same training of %s epochs, from which recipe."
+            "extends_epochs=%s goes on",
+            other,
+            *[other.recipe()["recipe.epochs"]] * 2,
+        )
     return None
+
+
+def check_checkpoint(cfg: DictConfig) -> None:
+    """See that a checkpoint that is named is there, before there is a data set.
+
+    Raises:
+        FileNotFoundError: it is not.
+    """
+    if cfg.ckpt_path not in (None, "last") and not Path(cfg.ckpt_path).is_file():
+        raise FileNotFoundError(
+            f"Expected a checkpoint at {cfg.ckpt_path}, found none; set ckpt_path"
+        )
+
+
+def shorter_ones(run: Run, identity: Mapping[str, Any]) -> list[Run]:
+    """Finished trainings that this one could go on from, the longest first."""
+    found = []
+    for path in run.folder.parent.glob("*/result.json"):
+        other = Run(path.parent)
+        there = other.recipe()
+        apart = {key for key in {*there, *identity} if there.get(key) != identity.get(key)}
+        if "recipe.epochs" in apart and apart <= FOLLOW_EPOCHS:
+            found.append((there["recipe.epochs"], other))
+    shorter = [each for each in found if each[0] < identity["recipe.epochs"]]
+    return [other for _, other in sorted(shorter, key=lambda each: -each[0])[:1]]
 
 
 def compare(path: Path, content: Mapping[str, Any], identity: Mapping[str, Any]) -> None:

@@ -23,7 +23,7 @@ from eqs.pipelines.judge import write_judge
 from eqs.pipelines.prepare import prepare_data, prepare_stream
 from eqs.pipelines.recipe import data_hash, recipe, recipe_hash, trials
 from eqs.pipelines.result import RunResult
-from eqs.pipelines.resume import checkpoint_path, identity_of, shorter_config
+from eqs.pipelines.resume import check_checkpoint, checkpoint_path, identity_of, shorter_config
 from eqs.pipelines.runs import Run
 from eqs.pipelines.timing import PhaseTimes, phase_times
 from eqs.pipelines.trainer import build_trainer, check_trainer, resumable
@@ -44,6 +44,8 @@ def train(cfg: DictConfig) -> RunResult | None:
     source = event_source(cfg.sim, cfg)
     protocol: LabelProtocol = instantiate(cfg.protocol)
     first = check_trainer(cfg)
+    build_task(cfg, protocol, []).configure_optimizers()
+    check_checkpoint(cfg)
     recipe(cfg)
     times = phase_times(cfg)
     data = prepare_data(cfg, times)

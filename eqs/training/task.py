@@ -23,6 +23,7 @@ from eqs.models import (
     gather_frames,
     reset_states,
 )
+from eqs.models.checkpoint import GEOMETRY
 from eqs.models.states import move_states, of_all_processes, of_this_process
 from eqs.models.synchronised import mean_over_processes
 from eqs.training.checkpoints import require_finite
@@ -186,6 +187,7 @@ class DetectionTask(lightning.LightningModule):
             ValueError: a weight is not finite.
         """
         require_finite(checkpoint["state_dict"], checkpoint["global_step"])
+        checkpoint[GEOMETRY] = self.model.backbone.partition_split_32
         checkpoint["train_states"] = of_all_processes(self._train_states)
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:

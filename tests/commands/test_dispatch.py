@@ -92,3 +92,18 @@ def test_a_mistake_is_answered_before_anything_heavy_is_loaded(arguments, wanted
     assert done.returncode == 1
     assert wanted in done.stderr
     assert done.stdout == "False\n"
+
+
+def test_ctrl_c_ends_in_a_sentence(monkeypatch, capsys, tmp_path):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("eqs.pipelines.prepare.prepare", interrupted)
+    monkeypatch.setattr("sys.argv", ["eqs", "prepare"])
+    with pytest.raises(SystemExit) as stopped:
+        run("prepare", [])
+    assert stopped.value.code == 130
+    said = capsys.readouterr().err
+    assert said.strip().splitlines()[-1] == "interrupted; type the same command again"
+    assert "Traceback" not in said

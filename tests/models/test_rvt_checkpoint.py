@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import nn
 
-from eqs.models import RVTDetector
+from eqs.models import RVTDetector, backbone_from_checkpoint
 from eqs.models.checkpoint import check_resumable
 
 
@@ -137,3 +137,21 @@ def test_pickled_code_is_not_run(tmp_path):
         pickle.dump({"state_dict": Payload()}, file, protocol=2)
     with pytest.raises(ValueError, match="refuses"):
         RVTDetector.from_checkpoint(tmp_path / "evil.ckpt")
+
+
+def test_a_checkpoint_that_knows_its_partition_is_taken_at_its_word(tmp_path):
+    model = RVTDetector("tiny", num_classes=2, partition_split_32=1)
+    path = tmp_path / "own.ckpt"
+    torch.save({"state_dict": model.state_dict(), "partition_split_32": 1}, path)
+    assert RVTDetector.from_checkpoint(path).backbone.partition_split_32 == 1
+    assert backbone_from_checkpoint(path, 1)[0].partition_split_32 == 1
+    for build in (RVTDetector.from_checkpoint, backbone_from_checkpoint):
+        with pytest.raises(ValueError, match=r"Expected partition_split_32=1, .*got 2; leave"):
+            build(path, partition_split_32=2)
+
+
+def test_without_a_word_the_partition_is_the_published_one(tmp_path):
+    path = tmp_path / "published.ckpt"
+    torch.save({"state_dict": RVTDetector("tiny", num_classes=2).state_dict()}, path)
+    assert RVTDetector.from_checkpoint(path).backbone.partition_split_32 == 2
+    assert backbone_from_checkpoint(path, 1)[0].partition_split_32 == 1

@@ -16,6 +16,7 @@ import eqs
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.recipe import recipe_hash
 from eqs.pipelines.resolvers import register_resolvers
+from eqs.pipelines.resume import shorter_ones
 from eqs.pipelines.runs import finished_runs
 from eqs.pipelines.train import Job, train
 
@@ -100,6 +101,30 @@ def test_the_same_command_goes_on_after_ctrl_c_and_ends_the_same(
     assert_equal_weights(again, real)
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    ["trainer=gpu", "logger=wandb", "ckpt_path=nowhere.ckpt", "model.weights=nowhere.ckpt",
+     "recipe.learning_rate=abc", "model.size=huge"],
+)  # fmt: skip
+def test_what_can_be_refused_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, wrong: str
+) -> None:
+    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
+    monkeypatch.setattr("lightning.pytorch.loggers.wandb._WANDB_AVAILABLE", False)
+    cfg = configured(tmp_path, "sim=esim", *([] if wrong == "logger=wandb" else [wrong]))
+    if wrong == "logger=wandb":
+        with open_dict(cfg):
+            cfg.logger = {
+                "wandb": {
+                    "_target_": "lightning.pytorch.loggers.WandbLogger", "_partial_": True
+                }
+            }  # fmt: skip
+    with pytest.raises(SystemExit):
+        train(cfg)
+    assert caplog.messages[-1].startswith("Expected")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.slow
 def test_a_trial_is_no_result(
     place: Path, real: DictConfig, caplog: pytest.LogCaptureFixture
@@ -139,6 +164,9 @@ def test_a_training_goes_on_for_longer(
 ) -> None:
     longer = configured(place, "sim=real", "recipe.epochs=3", "recipe.extends_epochs=2")
     shorter = weights(real)
+    anew = job(configured(place, "sim=real", "recipe.epochs=3"))
+    (found,) = shorter_ones(anew.run, anew.identity)  # who forgets the option is told of it
+    assert found.folder == job(real).run.folder
     assert train(longer) is not None
     content = torch.load(job(longer).run.last_checkpoint, weights_only=True)
     assert content["global_step"] == 3
