@@ -56,7 +56,7 @@ def test_no_match_and_unknown_split(tmp_path, make_recording, caplog):
         folder(tmp_path).recordings("test")
     with pytest.raises(ValueError, match="splits train, val, test, got 'dev'"):
         folder(tmp_path).recordings("dev")
-    folder(tmp_path, splits={"train": ["train_a", "train_z"]}).recordings("train")
+    folder(tmp_path, splits={"train": ["train_a", "train_z"]}).prepare()
     assert "no sequence train_z" in caplog.text
 
 
