@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 log = logging.getLogger(__name__)
 PARTIAL = ".partial"
+MADE_HERE = "event-quality-score"  # what pictures and films made here say of themselves
 ABANDONED_S = 86_400  # nobody writes a day long without touching the file
 
 
@@ -96,6 +97,20 @@ def one_at_a_time(path: Path | str, work: str) -> Iterator[None]:
         yield
     finally:
         lock.release()
+
+
+def refuse_foreign(path: Path | str) -> None:
+    """Let nobody lose a picture or film that does not say that it was made here.
+
+    Raises:
+        ValueError: there is such a file.
+    """
+    path = Path(path)
+    if path.exists() and not (path.is_file() and MADE_HERE.encode() in path.read_bytes()):
+        raise ValueError(
+            f"Expected no other file at {path}, got one that was not made here; name another "
+            "place, or remove it"
+        )
 
 
 def write_text(text: str, path: Path) -> Path:

@@ -14,6 +14,7 @@ from rich.table import Table
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from eqs.drawing import learning_curves, save_figure
+from eqs.files import refuse_foreign
 from eqs.pipelines.runs import Run
 
 SHOWN = ("model", "recipe", "task")  # parts of a configuration in which trainings differ
@@ -56,6 +57,12 @@ def main(arguments: Sequence[str], shown: str) -> None:
     parser.add_argument("runs", type=Path, nargs="+", help="folders of finished trainings")
     parser.add_argument("--curve", type=Path, help="draw accuracy over time, as .png")
     given = parser.parse_args(arguments)
+    if given.curve:
+        try:
+            for suffix in (".png", ".svg"):
+                refuse_foreign(given.curve.with_suffix(suffix))
+        except ValueError as error:
+            sys.exit(str(error))
     runs = [Run(folder) for folder in given.runs]
     unfinished = [str(run.folder) for run in runs if not run.finished]
     if unfinished:

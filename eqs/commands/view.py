@@ -9,6 +9,7 @@ from pathlib import Path
 
 from eqs.drawing import event_pictures, write_film
 from eqs.events import EventReader
+from eqs.files import refuse_foreign
 
 
 def main(arguments: Sequence[str], shown: str) -> None:
@@ -26,6 +27,7 @@ def main(arguments: Sequence[str], shown: str) -> None:
     given = parser.parse_args(arguments)
     out = given.out or given.events.with_suffix(".gif")
     try:
+        refuse_foreign(out)  # before the work
         with EventReader(given.events, given.height, given.width) as reader:
             start_us = reader.start_us
             stop_us = min(reader.stop_us, start_us + int(1e6 * given.seconds))

@@ -13,6 +13,7 @@ from hydra.utils import instantiate
 from eqs.data import Recording
 from eqs.drawing import event_picture, with_boxes, write_film
 from eqs.events import EventReader
+from eqs.files import refuse_foreign
 from eqs.pipelines.detections import detections_over
 from eqs.pipelines.runs import Run
 
@@ -51,6 +52,7 @@ def main(arguments: Sequence[str], shown: str) -> None:
     if not run.finished:
         sys.exit(f"Expected a finished training in {given.run}, got none; give a folder of runs/")
     try:
+        refuse_foreign(given.out)  # before the work
         recording = Recording.load(given.recording)
         pictures = film(
             run,

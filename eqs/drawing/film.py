@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from PIL.PngImagePlugin import PngInfo
 
 from eqs.drawing.pictures import Boxes, above, box_colour, event_image
 from eqs.drawing.style import BRIGHTER, DARKER
 from eqs.events import EventReader, Events
 from eqs.extras import needed
-from eqs.files import complete_file
+from eqs.files import MADE_HERE, complete_file, refuse_foreign
 
 Picture = NDArray[np.uint8]
 STILLS = 8  # in a strip
@@ -90,7 +91,8 @@ def write_film(
 ) -> None:
     """Write pictures as `.gif`, `.mp4` or, a few of them side by side, `.png`.
 
-    The file appears under its name once it is complete.
+    The file appears under its name once it is complete, and says that it was made here; another
+    one in its place is left alone.
 
     Args:
         path: where to; the ending chooses the format.
@@ -99,9 +101,10 @@ def write_film(
         zoom: side of the square that a pixel becomes.
 
     Raises:
-        ValueError: an unknown ending, or no picture.
+        ValueError: an unknown ending, no picture, or a file that was not made here is there.
     """
     path = Path(path)
+    refuse_foreign(path)
     writers = {".gif": _write_gif, ".mp4": _write_mp4, ".png": _write_strip}
     if path.suffix not in writers or not len(pictures) or zoom < 1:
         raise ValueError(
@@ -116,7 +119,8 @@ def write_film(
 def _write_gif(path: Path, pictures: Sequence[Picture], frames_per_second: float) -> None:
     first, *rest = [Image.fromarray(picture) for picture in pictures]
     duration_ms = round(1000 / frames_per_second)
-    first.save(path, format="GIF", save_all=True, append_images=rest, duration=duration_ms, loop=0)
+    played = {"append_images": rest, "duration": duration_ms, "loop": 0, "comment": MADE_HERE}
+    first.save(path, format="GIF", save_all=True, **played)
 
 
 def _write_mp4(path: Path, pictures: Sequence[Picture], frames_per_second: float) -> None:
@@ -124,6 +128,7 @@ def _write_mp4(path: Path, pictures: Sequence[Picture], frames_per_second: float
         import av
     height, width = pictures[0].shape[:2]
     with av.open(str(path), "w", format="mp4") as container:
+        container.metadata["comment"] = MADE_HERE
         stream = container.add_stream("h264", rate=max(1, round(frames_per_second)))
         stream.height, stream.width = height + height % 2, width + width % 2
         stream.pix_fmt = "yuv420p"
@@ -139,4 +144,6 @@ def _write_strip(path: Path, pictures: Sequence[Picture], _: float) -> None:
     row: list[Picture] = []
     for index in chosen:
         row += [pictures[index], gap]
-    Image.fromarray(np.concatenate(row[:-1], axis=1)).save(path, format="PNG")
+    said = PngInfo()
+    said.add_text("Software", MADE_HERE)
+    Image.fromarray(np.concatenate(row[:-1], axis=1)).save(path, format="PNG", pnginfo=said)

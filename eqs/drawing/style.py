@@ -9,7 +9,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from eqs.files import complete_file
+from eqs.files import MADE_HERE, complete_file
 from eqs.names import REFERENCE
 
 DARKER = "#d7301f"
@@ -62,7 +62,7 @@ def save_figure(drawing: Figure, folder: Path | str, name: str) -> Path:
     folder = Path(folder)
     for kind in ("svg", "png"):
         path = folder / f"{name}.{kind}"
-        undated = {"Date": None} if kind == "svg" else {"Software": None}
+        said = {"Date": None, "Creator": MADE_HERE} if kind == "svg" else {"Software": MADE_HERE}
         with complete_file(path) as partial, mpl.rc_context(STYLE):
-            drawing.savefig(partial, format=kind, dpi=150, bbox_inches="tight", metadata=undated)
+            drawing.savefig(partial, format=kind, dpi=150, bbox_inches="tight", metadata=said)
     return path

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from eqs.events import EventReader
 from eqs.extras import DISTRIBUTION
-from eqs.files import complete_file, write_json
+from eqs.files import complete_file, read_json, write_json
 from eqs.metrics import StreamScore
 from eqs.metrics.grid import Grid, fewest_windows
 from eqs.metrics.windows import common_grid
@@ -62,9 +62,12 @@ def score_files(cfg: DictConfig) -> None:
 
     Raises:
         FileNotFoundError: a file is missing.
-        ValueError: there is no judge, or the streams share no whole window or no sensor size.
+        ValueError: there is no judge, the streams share no whole window or no sensor size, or the
+            folder holds files of these names that this command did not write.
     """
-    scoring, out = find_scoring(cfg, None), Path(cfg.out)
+    out = Path(cfg.out)
+    refuse_others(out)
+    scoring = find_scoring(cfg, None)
     pair = compare(cfg, scoring)
     result, window_us = pair.scores[scoring.headline.name], pair.grid.window_us
     files = {"simulated": str(cfg.simulated), "real": str(cfg.real)}
@@ -171,3 +174,20 @@ def show(pair: Pair, scoring: Scoring, console: Console) -> None:
         f"{pair.events['simulated']} simulated and {pair.events['real']} real events; "
         f"judge: {scoring.judge.description} ({scoring.judge.weights_sha256[:12]})"
     )
+
+
+def refuse_others(out: Path) -> None:
+    """Let nobody lose files that are called as this command's are.
+
+    Raises:
+        ValueError: there are some, and no record of this command beside them.
+    """
+    names = ("score.json", "curve.csv", "map.png", "map.svg", "curve.png", "curve.svg")
+    there = [name for name in names if (out / name).exists()]
+    record = out / "score.json"
+    ours = record.is_file() and {"eqs", "definition"} <= read_json(record).keys()
+    if there and not ours:
+        raise ValueError(
+            f"Expected a folder of earlier scores or none at {out}, got {', '.join(there)} of "
+            "something else; set out"
+        )

@@ -85,3 +85,16 @@ def test_boxes_are_outlined_and_weak_ones_left_out():
     expected[4:8, 3:7] = False
     np.testing.assert_array_equal(marked, expected)
     assert (blank == 255).all()
+
+
+@pytest.mark.parametrize("name", ["a.gif", "a.mp4", "a.png"])
+def test_a_film_replaces_its_like_and_nothing_else(tmp_path, pictures, name):
+    path = tmp_path / name
+    path.write_bytes(b"a holiday")
+    with pytest.raises(ValueError, match=r"no other file at .*got one that was not made here"):
+        write_film(path, pictures)
+    assert path.read_bytes() == b"a holiday"
+    path.unlink()
+    for _ in range(2):
+        write_film(path, pictures)
+    assert path.stat().st_size > 100

@@ -187,3 +187,13 @@ def test_few_windows_are_named(files, tmp_path, caplog):
     caplog.clear()
     result(files[1], files[0], tmp_path / "whole", "start_us=0", "stop_us=2000000")
     assert "Few windows" not in caplog.text
+
+
+def test_files_of_something_else_are_left_alone(files, tmp_path, caplog):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "curve.csv").write_text("mine")
+    with pytest.raises(SystemExit):
+        run(files[1], files[0], out, "taps=[]")
+    assert "got curve.csv of something else; set out" in caplog.messages[-1]
+    assert (out / "curve.csv").read_text() == "mine"
