@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from eqs.data import LabelProtocol, Recording, seen_between_frames
+from eqs.data import DSECFolder, LabelProtocol, Recording, seen_between_frames
 from eqs.events import EventReader
 from eqs.pipelines.build import Dataset
 from eqs.pipelines.command import explained
@@ -157,6 +157,12 @@ def check(cfg: DictConfig) -> None:
         ValueError: a recording cannot be used.
     """
     data: Dataset = instantiate(cfg.data)
+    generator = data.generator if isinstance(data, DSECFolder) else None
+    if generator is not None and not Path(data.root).is_dir():
+        raise FileNotFoundError(
+            f"Expected {data.name} at {data.root}, which is rendered on first use; type python "
+            "scripts/prepare.py first, or set data.root"
+        )
     protocol: LabelProtocol = instantiate(cfg.protocol)
     look = Inspection(data=data, protocol=protocol, window_us=cfg.window_us, thorough=cfg.thorough)
     places = [(split, path) for split, paths in data.folders().items() for path in paths]

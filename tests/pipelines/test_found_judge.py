@@ -8,6 +8,7 @@ import pytest
 import torch
 from hydra import compose, initialize_config_dir
 
+from eqs.events import EventReader
 from eqs.metrics import EventQualityScore, Judge
 from eqs.models import RVTDetector
 from eqs.pipelines import judge, scoring
@@ -120,3 +121,38 @@ def test_a_checkpoint_is_centred_on_the_training_recordings_and_kept(tmp_path, m
     shutil.rmtree(tmp_path / "data" / "train")
     again = scoring.find_scoring(cfg, None)
     assert again.headline.centre.sha256 == found.headline.centre.sha256
+
+
+def test_centres_follow_the_recordings_they_were_computed_from(tmp_path, make_recording):
+    for index, name in enumerate(("train_a", "test_a")):
+        make_recording(tmp_path / "data" / name, height=32, width=32, seed=index)
+    torch.manual_seed(0)
+    detector = RVTDetector("tiny", partition_split_32=1)
+    torch.save({"state_dict": detector.state_dict()}, tmp_path / "some.ckpt")
+    Judge.random(size="tiny").centred_on(
+        [EventReader(tmp_path / "data/test_a/events/left/events.h5", 32, 32)]
+    ).save(tmp_path / "published")
+    found = {}
+    for step in ("half", "whole", "again"):
+        if step == "whole":  # the rest of the download
+            make_recording(tmp_path / "data/train_b", height=32, width=32, seed=2)
+        for judge_named in ("some.ckpt", "published"):
+            with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+                cfg = compose(
+                    "evaluate",
+                    [
+                        f"eqs.judge={tmp_path / judge_named}",
+                        f"paths.results={tmp_path / 'results'}",
+                        "data=dsec",
+                        f"data.root={tmp_path / 'data'}",
+                        "data.size=32x32",
+                        "data.crop_rows=null",
+                        "data.splits={train: [train_*], val: [], test: [test_a]}",
+                    ],
+                )
+            headline = scoring.find_scoring(cfg, dataset(cfg)).headline
+            found[judge_named, step] = headline.centre.sha256
+    assert found["some.ckpt", "half"] != found["some.ckpt", "whole"]
+    assert found["some.ckpt", "whole"] == found["some.ckpt", "again"]
+    assert len({found["published", step] for step in ("half", "whole", "again")}) == 1
+    assert len(list((tmp_path / "published").glob("centre-*"))) == 1
