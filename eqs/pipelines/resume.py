@@ -69,10 +69,10 @@ def checkpoint_path(
         return path
     for other in shorter_ones(run, identity):
         log.warning(
-            "beginning anew; %s holds the same training of %s epochs, from which recipe."
-            "extends_epochs=%s goes on",
-            other,
-            *[other.recipe()["recipe.epochs"]] * 2,
+            "beginning anew; %s holds the same training of %s epochs, which "
+            "recipe.extends_epochs goes on from",
+            other.folder,
+            other.recipe()["recipe.epochs"],
         )
     return None
 

@@ -43,6 +43,7 @@ def train(cfg: DictConfig) -> RunResult | None:
     """
     source = event_source(cfg.sim, cfg)
     protocol: LabelProtocol = instantiate(cfg.protocol)
+    # Built for what they refuse, before a data set is generated.
     first = check_trainer(cfg)
     build_task(cfg, protocol, []).configure_optimizers()
     check_checkpoint(cfg)
