@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from eqs.drawing import event_pictures, write_film
-from eqs.events import EventReader
+from eqs.events.formats import open_events
 from eqs.files import refuse_foreign
 
 
@@ -28,7 +28,7 @@ def main(arguments: Sequence[str], shown: str) -> None:
     out = given.out or given.events.with_suffix(".gif")
     try:
         refuse_foreign(out)  # before the work
-        with EventReader(given.events, given.height, given.width) as reader:
+        with open_events(given.events, given.height, given.width) as reader:
             start_us = reader.start_us
             stop_us = min(reader.stop_us, start_us + int(1e6 * given.seconds))
             pictures = event_pictures(

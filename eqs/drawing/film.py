@@ -14,6 +14,7 @@ from PIL.PngImagePlugin import PngInfo
 from eqs.drawing.pictures import Boxes, above, box_colour, event_image
 from eqs.drawing.style import BRIGHTER, DARKER
 from eqs.events import EventReader, Events
+from eqs.events.loaded import LoadedEvents
 from eqs.extras import needed
 from eqs.files import MADE_HERE, complete_file, refuse_foreign
 
@@ -40,7 +41,7 @@ def histogram_picture(histogram: NDArray[np.integer]) -> Picture:
 
 
 def event_pictures(
-    reader: EventReader,
+    reader: EventReader | LoadedEvents,
     *,
     start_us: int,
     stop_us: int,

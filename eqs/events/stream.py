@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from eqs.clock import backwards
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 FIELDS = {"t": np.int64, "x": np.uint16, "y": np.uint16, "p": np.uint8}
 
@@ -158,9 +156,17 @@ class Events:
 
     @classmethod
     def load(cls, path: Path | str, height: int | None = None, width: int | None = None) -> Events:
-        """Read a whole DSEC HDF5 file; the sensor size is needed where the file lacks it."""
+        """Read a whole event file of any kind; the sensor size is needed where it lacks that.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: the file is of no known kind, damaged, or fits several readings.
+        """
+        from eqs.events.formats import decode, is_dsec
         from eqs.events.reader import EventReader
 
+        if not is_dsec(Path(path)):
+            return decode(path).events(height, width)
         with EventReader(path, height=height, width=width) as reader:
             return reader.read()
 

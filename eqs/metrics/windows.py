@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from eqs.events import EventReader, Events
+from eqs.events.loaded import LoadedEvents
 from eqs.metrics.definition import Definition
 from eqs.metrics.grid import Grid
 from eqs.representations import stacked_histogram
@@ -24,7 +25,7 @@ EVENTS_PER_PIXEL_AND_SECOND = 35.0
 
 
 # A stream in memory or in a file, or its histograms (windows, 2 * bins, height, width).
-EventStream = Events | EventReader
+EventStream = Events | EventReader | LoadedEvents
 StreamOrHistograms = EventStream | Tensor
 
 

@@ -14,6 +14,7 @@ from rich.progress import track
 
 from eqs.data import EventSource, Recording
 from eqs.events import EventReader, Events
+from eqs.events.loaded import LoadedEvents
 from eqs.metrics import EventQualityScore, anchors
 from eqs.metrics.baselines import FeatureFrechet, baselines
 from eqs.metrics.definition import choices
@@ -222,7 +223,7 @@ def first_events(reader: EventReader) -> Events:
 
 def score_anchors(
     scoring: Scoring,
-    real: EventReader,
+    real: EventReader | LoadedEvents,
     start_us: int,
     stop_us: int,
     *,

@@ -13,7 +13,7 @@ from omegaconf import DictConfig
 from rich.console import Console
 from rich.table import Table
 
-from eqs.events import EventReader
+from eqs.events.formats import open_events
 from eqs.extras import DISTRIBUTION
 from eqs.files import complete_file, read_json, write_json
 from eqs.metrics import StreamScore
@@ -90,8 +90,8 @@ def compare(cfg: DictConfig, scoring: Scoring) -> Pair:
     """Score the files over the windows that a study would cut."""
     size, window_us = (cfg.height, cfg.width, cfg.rows), scoring.headline.definition.window_us
     with (
-        EventReader(cfg.real, *size) as real,
-        EventReader(cfg.simulated, *size) as simulated,
+        open_events(cfg.real, *size) as real,
+        open_events(cfg.simulated, *size) as simulated,
     ):
         grid = common_grid([real, simulated], window_us, cfg.start_us, cfg.stop_us)
         span = grid.start_us, grid.stop_us

@@ -16,7 +16,7 @@ ROOMS = {
     "eqs.files": "",
     "eqs.processors": "",
     "eqs.content": "processors",
-    "eqs.events": "clock files",
+    "eqs.events": "clock extras files",
     "eqs.frames": "clock extras files",
     "eqs.representations": "events",
     "eqs.drawing": "events extras files names",

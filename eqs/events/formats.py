@@ -1,0 +1,101 @@
+"""Any event file: what it is, told by its first bytes, and the events that it holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+
+from eqs.events.aedat import read_aedat2, read_aedat3, read_aedat4
+from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
+from eqs.events.decoded import Decoded
+from eqs.events.loaded import LoadedEvents
+from eqs.events.raw import read_prophesee
+from eqs.events.reader import EventReader
+from eqs.events.tables import read_foreign_hdf5, read_numpy, read_text
+
+READ = (
+    "DSEC, v2e, event_utils, MVSEC, M3ED and Metavision HDF5, RAW (EVT2, EVT2.1, EVT3), DAT, "
+    "AEDAT 2, 3.1 and 4, Event Stream, 40-bit .bin, npy, npz, text and CSV"
+)
+ELSEWHERE = {
+    b"#ROSBAG": "a ROS bag", b"SQLite format 3": "a ROS 2 bag", b"\x89MCAP": "an MCAP file",
+    b"MATLAB 5": "a MATLAB file",
+}  # fmt: skip
+
+
+def open_events(
+    path: Path | str,
+    height: int | None = None,
+    width: int | None = None,
+    rows: int | None = None,
+) -> EventReader | LoadedEvents:
+    """A file in the layout of DSEC, read piece by piece, or any other, read whole.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file is of no known kind, or damaged, or nobody says its sensor's size.
+    """
+    if is_dsec(Path(path)):
+        return EventReader(path, height, width, rows)
+    return LoadedEvents(decode(path).events(height, width), rows)
+
+
+def is_dsec(path: Path) -> bool:
+    """Whether a file is HDF5 in the layout of DSEC; one that cannot be opened may be.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    if _first_bytes(path)[:8] != b"\x89HDF\r\n\x1a\n":
+        return path.suffix.lower() in (".h5", ".hdf5")  # whose reader says what is wrong
+    try:
+        with h5py.File(path) as file:
+            return "ms_to_idx" in file
+    except OSError:
+        return True  # whose reader says what is wrong
+
+
+def decode(path: Path | str, order: str | None = None, time_unit: str | None = None) -> Decoded:
+    """The events of a file that is not in the layout of DSEC.
+
+    Args:
+        path: the file.
+        order: order of the columns of a table without names, for instance `txyp`.
+        time_unit: unit of a table's times, where they are whole numbers: s, ms, us or ns.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file is of no known kind, or damaged, or fits several readings.
+    """
+    path = Path(path)
+    first = _first_bytes(path)
+    if first[:8] == b"\x89HDF\r\n\x1a\n":
+        return read_foreign_hdf5(path, time_unit)
+    if first[:1] == b"%":
+        return read_prophesee(path)
+    for start, read in (
+        (b"#!AER-DAT2", read_aedat2), (b"#!AER-DAT3", read_aedat3), (b"#!AER-DAT4", read_aedat4),
+        (HEADER, read_event_stream),
+    ):  # fmt: skip
+        if first.startswith(start):
+            return read(path)
+    if first[:6] == b"\x93NUMPY" or (first[:4] == b"PK\x03\x04" and path.suffix == ".npz"):
+        return read_numpy(path, order, time_unit)
+    for start, kind in ELSEWHERE.items():
+        if first.startswith(start):
+            raise ValueError(f"Expected {READ} in {path}, got {kind}; convert it to one of these")
+    if path.suffix == ".bin":
+        return read_forty_bits(path)
+    if path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv", ".dat"):
+        return read_text(path, order, time_unit)
+    raise ValueError(f"Expected {READ} in {path}, got none of them; convert it")
+
+
+def _first_bytes(path: Path) -> bytes:
+    if not path.is_file():
+        raise FileNotFoundError(
+            f"Expected an event file at {path}, found none; check data.root, or make the file first"
+        )
+    with path.open("rb") as file:
+        return file.read(32)

@@ -1,0 +1,243 @@
+"""Events as tables: text, CSV, npy and npz, and the HDF5 files of other programs."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from eqs.events.decoded import Decoded
+
+UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
+NAMES = {
+    "t": ("t", "ts", "time", "timestamp", "timestamps"),
+    "x": ("x", "xs", "col", "column"),
+    "y": ("y", "ys", "row"),
+    "p": ("p", "ps", "pol", "polarity", "polarities", "on"),
+}
+ORDERS = ("txyp", "xytp", "xypt", "tpxy", "pxyt")
+# Where programs put their events: a dataset of four columns in a known order and unit, or a group.
+COLUMNS = {"davis/left/events": ("xytp", "s"), "events": ("txyp", "us")}
+GROUPS = ("prophesee/left", "events", "CD/events")
+ECF = 36559
+LISTED = 8
+
+
+def read_text(path: Path, order: str | None = None, time_unit: str | None = None) -> Decoded:
+    """Events of a text file or a zip of one: four numbers a line, with a header or without.
+
+    A first line of two numbers is the sensor's width and height.
+
+    Raises:
+        ValueError: the lines are no events, or fit several orders or units.
+    """
+    content = path.read_bytes()
+    if content[:4] == b"PK\x03\x04":
+        with zipfile.ZipFile(path) as archive:
+            content = archive.read(archive.namelist()[0])
+    lines = content.decode("utf-8", "replace").splitlines()
+    height = width = None
+    names: list[str] = []
+    while lines and not _numbers(lines[0], 4):
+        pair = _numbers(lines[0], 2)
+        if pair and len(lines[0].replace(",", " ").split()) == 2:
+            width, height = int(pair[0]), int(pair[1])
+        elif any(letter.isalpha() for letter in lines[0]):
+            names = lines[0].lstrip("#% ").replace(",", " ").replace(";", " ").split()
+        lines = lines[1:]
+    text = "\n".join(lines).replace(",", " ").replace(";", " ")
+    try:
+        table = (
+            np.loadtxt(io.StringIO(text), dtype=np.float64, ndmin=2) if lines else np.zeros((0, 4))
+        )
+    except ValueError as error:
+        raise ValueError(f"Expected four numbers a line in {path}, got: {error}") from error
+    columns = by_name(names, table) or by_order(table, path, order)
+    return decoded(columns, path, "a text file", time_unit, height, width)
+
+
+def _numbers(line: str, count: int) -> list[float]:
+    parts = line.replace(",", " ").replace(";", " ").split()[:count]
+    try:
+        return [float(part) for part in parts] if len(parts) == count else []
+    except ValueError:
+        return []
+
+
+def read_numpy(path: Path, order: str | None = None, time_unit: str | None = None) -> Decoded:
+    """Events of an npy or npz file: four columns, named fields, or an array for each.
+
+    Raises:
+        ValueError: it holds something else, or fits several orders or units.
+    """
+    try:
+        found = np.load(path, allow_pickle=False)
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"Expected arrays of events in {path}, got: {error}") from error
+    if isinstance(found, np.lib.npyio.NpzFile):
+        with found:
+            arrays = {name: found[name] for name in found.files}
+        named = by_key(arrays)
+        if named:
+            return decoded(named, path, "an npz file", time_unit)
+        tables = [each for each in arrays.values() if each.ndim == 2 or each.dtype.names]
+        if len(tables) != 1:
+            raise ValueError(f"Expected one table of events in {path}, got {sorted(arrays)}")
+        found = tables[0]
+    if found.dtype.names:
+        named = by_key({name: found[name] for name in found.dtype.names})
+        if named:
+            return decoded(named, path, "a numpy file", time_unit)
+    if found.ndim != 2 or found.shape[1] != 4:
+        raise ValueError(
+            f"Expected events in four columns or named fields in {path}, got {found.dtype} of "
+            f"shape {found.shape}"
+        )
+    return decoded(by_order(found, path, order), path, "a numpy file", time_unit)
+
+
+def read_foreign_hdf5(path: Path, time_unit: str | None = None) -> Decoded:
+    """Events of an HDF5 file of v2e, MVSEC, event_utils, M3ED or Metavision.
+
+    Raises:
+        ValueError: it is none of these, or compressed by a filter that cannot be had.
+    """
+    with h5py.File(path) as file:
+        for place, (order, unit) in COLUMNS.items():
+            found = file.get(place)
+            if isinstance(found, h5py.Dataset) and found.ndim == 2 and found.shape[1] == 4:
+                columns = dict(zip(order, found[:].T, strict=True))
+                return decoded(columns, path, f"an HDF5 file ({place})", time_unit or unit)
+        for place in GROUPS:
+            group = file.get(place)
+            if isinstance(group, h5py.Dataset) and group.dtype.names:
+                _require_filter(group, path)
+                table = group[:]
+                arrays = {name: table[name] for name in table.dtype.names}
+            elif isinstance(group, h5py.Group):
+                arrays = {
+                    n: d[:] for n, d in group.items() if isinstance(d, h5py.Dataset) and d.ndim == 1
+                }
+            else:
+                continue
+            named = by_key(arrays)
+            if named:
+                unit = "s" if named["t"].dtype.kind == "f" else "us"
+                return decoded(named, path, f"an HDF5 file ({place})", time_unit or unit)
+        held: list[str] = []
+        file.visititems(
+            lambda name, each: held.append(name) if isinstance(each, h5py.Dataset) else None
+        )
+        shown = ", ".join(held[:LISTED]) or "nothing"
+        raise ValueError(
+            f"Expected the events of DSEC (events/x, y, p, t and ms_to_idx), v2e, MVSEC, "
+            f"event_utils, M3ED or Metavision in {path}, got {shown}; convert it"
+        )
+
+
+def _require_filter(dataset: h5py.Dataset, path: Path) -> None:
+    filters = dataset.id.get_create_plist()
+    kinds = [filters.get_filter(index)[0] for index in range(filters.get_nfilters())]
+    if ECF in kinds and not h5py.h5z.filter_avail(ECF):
+        raise ValueError(
+            f"Expected events without Metavision's own compression (filter {ECF}) in {path}, got "
+            "such; convert it with metavision_file_to_dat, or take the RAW file it was made from"
+        )
+
+
+def by_key(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Arrays by the field that their names mean; none unless all four are there."""
+    found = {
+        field: array
+        for field, names in NAMES.items()
+        for name, array in arrays.items()
+        if name.lower() in names
+    }
+    return found if len(found) == len(NAMES) else {}
+
+
+def by_name(names: list[str], table: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Columns by the header above them; none without a header of four known names."""
+    if len(names) != table.shape[1]:
+        return {}
+    plain = [name.partition("_")[0].partition("[")[0] for name in names]  # t_us, t[us]
+    return by_key(dict(zip(plain, table.T, strict=True)))
+
+
+def by_order(table: NDArray[Any], path: Path, order: str | None) -> dict[str, NDArray[Any]]:
+    """Columns by their order, which is given, or the only one that fits.
+
+    Raises:
+        ValueError: the order is none, or several fit, or none does.
+    """
+    if table.ndim != 2 or table.shape[1] != 4:
+        raise ValueError(f"Expected four columns in {path}, got shape {table.shape}")
+    if order is not None:
+        if sorted(order) != sorted("txyp"):
+            raise ValueError(f"Expected an order of t, x, y and p, got {order!r}; set order=txyp")
+        return dict(zip(order, table.T, strict=True))
+    fits = [each for each in ORDERS if _fits(dict(zip(each, table.T, strict=True)))]
+    if len(fits) != 1:
+        raise ValueError(
+            f"Expected columns that fit one order in {path}, got {' and '.join(fits) or 'none'}; "
+            "set order, for instance order=txyp"
+        )
+    return dict(zip(fits[0], table.T, strict=True))
+
+
+def _fits(columns: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether columns can be what an order says: rising times, pixels, two polarities."""
+    t, p = columns["t"], columns["p"]
+    pixels = all(
+        np.all(columns[name] == np.floor(columns[name])) and columns[name].min(initial=0) >= 0
+        and columns[name].max(initial=0) < 65536
+        for name in "xy"
+    )  # fmt: skip
+    return bool(pixels and np.isin(p, (-1, 0, 1)).all() and np.all(np.diff(t) >= 0))
+
+
+def decoded(
+    columns: Mapping[str, NDArray[Any]],
+    path: Path,
+    kind: str,
+    time_unit: str | None = None,
+    height: int | None = None,
+    width: int | None = None,
+) -> Decoded:
+    """Columns in this project's convention.
+
+    Raises:
+        ValueError: the unit of the times is none, or is not known and cannot be told.
+    """
+    t = columns["t"]
+    if time_unit is None:
+        fractions = t.dtype.kind == "f" and bool(np.any(t != np.floor(t)))
+        if not fractions and len(t):
+            raise ValueError(
+                f"Expected to know the unit of the whole-numbered times in {path} "
+                f"({t.min():.0f} to {t.max():.0f}); set time_unit=us, ns, ms or s"
+            )
+        time_unit = "s"
+    if time_unit not in UNITS_US:
+        raise ValueError(
+            f"Expected a unit among {', '.join(UNITS_US)}, got {time_unit!r}; set time_unit"
+        )
+    factor = UNITS_US[time_unit]
+    times = t
+    if t.dtype.kind in "iu":  # whole numbers stay exact
+        times = t // 1000 if time_unit == "ns" else t.astype(np.int64) * int(factor)
+    else:
+        exact = t * factor
+        times = np.floor(exact + 2 * np.spacing(exact))  # what was written, past float's rounding
+    brighter = (columns["p"] > 0).astype(np.uint8)
+    x, y = (columns[name].astype(np.int64) for name in "xy")
+    return Decoded(
+        kind=f"{kind}, times in {time_unit}", t=times.astype(np.int64), x=x, y=y, p=brighter,
+        height=height, width=width,
+    )  # fmt: skip

@@ -1,0 +1,293 @@
+"""Event files of other programs, encoded here by the descriptions of their formats."""
+
+import contextlib
+import zipfile
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from eqs.commands.info import described, sketch
+from eqs.events import Events
+from eqs.events.formats import decode, is_dsec, open_events
+from eqs.events.loaded import LoadedEvents
+
+HEIGHT, WIDTH = 48, 64
+SIZE = {"height": HEIGHT, "width": WIDTH}
+
+
+@pytest.fixture
+def events():
+    generator = np.random.default_rng(0)
+    t = 1_000_000 + np.sort(generator.integers(0, 90_000, 500))
+    x, y, p = (generator.integers(0, high, 500) for high in (WIDTH, HEIGHT, 2))
+    return Events.from_arrays(t, x, y, p, **SIZE)
+
+
+def rows(events):
+    return np.stack([events.t, events.x, events.y, events.p], axis=1).astype(np.int64)
+
+
+def evt2(events):
+    words, high = [], None
+    for t, x, y, p in rows(events).tolist():
+        if t >> 6 != high:
+            high = t >> 6
+            words.append(8 << 28 | high & 0x0FFFFFFF)
+        words.append(p << 28 | (t & 63) << 22 | x << 11 | y)
+    return (
+        f"% evt 2.0\n% geometry {WIDTH}x{HEIGHT}\n% end\n".encode()
+        + np.array(words, "<u4").tobytes()
+    )
+
+
+def evt21(events):
+    words, high = [], None
+    for t, x, y, p in rows(events).tolist():
+        if t >> 6 != high:
+            high = t >> 6
+            words.append(8 << 60 | (high & 0x0FFFFFFF) << 32)
+        base, lane = x // 32 * 32, x % 32
+        words.append(p << 60 | (t & 63) << 54 | base << 43 | y << 32 | 1 << lane)
+    header = f"% evt 2.1\n% width {WIDTH}\n% height {HEIGHT}\n% end\n".encode()
+    return header + np.array(words, "<u8").tobytes()
+
+
+def evt3(events, vectors=True):
+    words, high = [], None
+    for index, (t, x, y, p) in enumerate(rows(events).tolist()):
+        if t >> 12 != high:
+            high = t >> 12
+            words.append(8 << 12 | high & 0xFFF)
+        words += [6 << 12 | t & 0xFFF, y]
+        if vectors and index % 2:
+            base = max(0, x - 15)
+            words.append(3 << 12 | p << 11 | base)
+            # Empty lanes move the base on until the event's lane comes.
+            words += [4 << 12 | (1 << (x - base) if x - base < 12 else 0)]
+            if x - base >= 12:
+                words.append(5 << 12 | 1 << (x - base - 12))
+        else:
+            words.append(2 << 12 | p << 11 | x)
+    header = f"% format EVT3;height={HEIGHT};width={WIDTH}\n% evt 3.0\n% end\n".encode()
+    return header + np.array(words, "<u2").tobytes()
+
+
+def dat(events):
+    table = rows(events)
+    data = table[:, 1] | table[:, 2] << 14 | table[:, 3] << 28
+    pairs = np.stack([table[:, 0], data], axis=1).astype("<u4")
+    header = f"% Version 2\n% Width {WIDTH}\n% Height {HEIGHT}\n".encode()
+    return header + b"\x0c\x08" + pairs.tobytes()
+
+
+def aedat3(events):
+    table = rows(events)
+    data = 1 | table[:, 3] << 1 | table[:, 2] << 2 | table[:, 1] << 17
+    body = np.stack([data, table[:, 0]], axis=1).astype("<u4").tobytes()
+    head = np.array([1, 0], "<i2").tobytes()
+    head += np.array([8, 4, 0, len(table), len(table), len(table)], "<i4").tobytes()
+    special = np.array([0, 0], "<i2").tobytes() + np.array([8, 4, 0, 1, 1, 1], "<i4").tobytes()
+    return b"#!AER-DAT3.1\r\n#Format: RAW\r\n#!END-HEADER\r\n" + special + b"\0" * 8 + head + body
+
+
+def event_stream(events):
+    content = bytearray(
+        b"Event Stream\x02\x00\x00\x01" + np.array([WIDTH, HEIGHT], "<u2").tobytes()
+    )
+    now = int(events.t[0]) - int(events.t[0])
+    for t, x, y, p in rows(events).tolist():
+        wait = t - int(events.t[0]) - now
+        content += b"\xff" * (wait // 127)
+        content.append((wait % 127) << 1 | p)
+        content += np.array([x, HEIGHT - 1 - y], "<u2").tobytes()
+        now = t - int(events.t[0])
+    return bytes(content)
+
+
+ENCODERS = {
+    "a.raw": evt2, "b.raw": evt21, "c.raw": evt3, "d.dat": dat, "e.aedat": aedat3,
+    "f.es": event_stream,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ENCODERS)
+def test_binary_files_give_the_events_that_were_written(tmp_path, events, name):
+    path = tmp_path / name
+    path.write_bytes(ENCODERS[name](events))
+    given = SIZE if name == "e.aedat" else {}
+    found = Events.load(path, **given)
+    shift = int(events.t[0]) if name == "f.es" else 0  # whose clock begins at zero
+    np.testing.assert_array_equal(rows(found), rows(events.shifted(-shift)))
+    assert not is_dsec(path)
+
+
+def test_a_clock_of_24_bits_is_counted_on(tmp_path, events):
+    late = events.shifted((1 << 24) - 1_040_000)
+    (tmp_path / "a.raw").write_bytes(evt3(late))
+    assert np.diff(Events.load(tmp_path / "a.raw").t).max() == np.diff(late.t).max()
+
+
+@pytest.mark.parametrize("chip", ["DVS128", "DAVIS346"])
+def test_addresses_of_jaer_are_turned_upright(tmp_path, chip):
+    height, width = {"DVS128": (128, 128), "DAVIS346": (260, 346)}[chip]
+    t, p = np.array([5, 9, 12]), [1, 0, 1]
+    x, y = np.array([0, 7, 100]), np.array([0, 3, 99])
+    if chip == "DVS128":
+        address = (1 - np.array(p)) | (width - 1 - x) << 1 | (height - 1 - y) << 8
+        special = 1 << 15
+    else:
+        address = np.array(p) << 11 | x << 12 | (height - 1 - y) << 22
+        special = 1 << 31
+    pairs = np.stack([np.append(address, special), np.append(t, 20)], axis=1)
+    content = f"#!AER-DAT2.0\r\n# AEChip: a.b.{chip}\r\n".encode() + pairs.astype(">u4").tobytes()
+    (tmp_path / "a.aedat").write_bytes(content)
+    found = Events.load(tmp_path / "a.aedat")
+    assert (found.height, found.width) == (height, width)
+    np.testing.assert_array_equal(rows(found), np.stack([t, x, y, p], axis=1))
+
+
+def test_rows_of_240_in_forty_bits_count_time_on(tmp_path):
+    parts = [(3, 4, 1, 10), (0, 240, 0, 0), (5, 6, 0, 20)]
+    content = b"".join(
+        bytes([x, y, p << 7 | t >> 16, t >> 8 & 255, t & 255]) for x, y, p, t in parts
+    )
+    (tmp_path / "a.bin").write_bytes(content)
+    found = Events.load(tmp_path / "a.bin", height=34, width=34)
+    assert rows(found).tolist() == [[10, 3, 4, 1], [8212, 5, 6, 0]]
+
+
+@pytest.mark.parametrize("kind", ["txt", "size", "header", "zip", "polarity"])
+def test_text_in_seconds(tmp_path, events, kind):
+    table = rows(events)
+    lines = [f"{t / 1e6:.6f} {x} {y} {p}" for t, x, y, p in table.tolist()]
+    if kind == "size":
+        lines.insert(0, f"{WIDTH} {HEIGHT}")
+    if kind == "header":
+        lines = ["x,y,timestamp,polarity"] + [
+            f"{x},{y},{t / 1e6:.6f},{p}" for t, x, y, p in table.tolist()
+        ]
+    if kind == "polarity":
+        lines = [f"{t / 1e6:.6f} {x} {y} {2 * p - 1}" for t, x, y, p in table.tolist()]
+    path = tmp_path / "events.txt"
+    path.write_text("\n".join(lines))
+    if kind == "zip":
+        with zipfile.ZipFile(tmp_path / "events.zip", "w") as archive:
+            archive.write(path, "events.txt")
+        path = tmp_path / "events.zip"
+    found = Events.load(path, **({} if kind == "size" else SIZE))
+    np.testing.assert_array_equal(rows(found), table)
+
+
+def test_whole_times_need_a_unit_and_two_readings_an_order(tmp_path, events):
+    path = tmp_path / "a.npy"
+    np.save(path, rows(events))
+    with pytest.raises(ValueError, match=r"unit of the whole-numbered times in .*; set time_unit="):
+        decode(path)
+    np.testing.assert_array_equal(rows(decode(path, time_unit="us").events(**SIZE)), rows(events))
+    nanoseconds = rows(events) * [1000, 1, 1, 1]
+    np.save(path, nanoseconds)
+    np.testing.assert_array_equal(rows(decode(path, time_unit="ns").events(**SIZE)), rows(events))
+    np.save(path, np.array([[0, 0, 0, 0], [1, 1, 1, 1]]))
+    with pytest.raises(ValueError, match=r"fit one order in .*, got txyp and .*; set order"):
+        decode(path, time_unit="us")
+    assert decode(path, "xypt", "us").t.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("kind", ["v2e", "mvsec", "event_utils", "m3ed", "npz", "fields"])
+def test_tables_of_other_programs(tmp_path, events, kind):
+    table, path = rows(events), tmp_path / "a.h5"
+    columns = dict(zip("txyp", table.T, strict=True))
+    if kind == "npz":
+        path = tmp_path / "a.npz"
+        np.savez(path, t=columns["t"] / 1e6, x=columns["x"], y=columns["y"], p=columns["p"])
+    elif kind == "fields":
+        path = tmp_path / "a.npy"
+        made = np.zeros(
+            len(table), [("timestamp", "f8"), ("x", "u2"), ("y", "u2"), ("polarity", "?")]
+        )
+        made["timestamp"], made["polarity"] = columns["t"] / 1e6, columns["p"]
+        made["x"], made["y"] = columns["x"], columns["y"]
+        np.save(path, made)
+    else:
+        with h5py.File(path, "w") as file:
+            if kind == "v2e":
+                file["events"] = table.astype(np.uint32)
+            elif kind == "mvsec":
+                seconds = np.stack([table[:, 1], table[:, 2], table[:, 0] / 1e6, table[:, 3]], 1)
+                file["davis/left/events"] = seconds
+            elif kind == "event_utils":
+                file["events/ts"], file["events/ps"] = columns["t"] / 1e6, columns["p"]
+                file["events/xs"], file["events/ys"] = columns["x"], columns["y"]
+            else:
+                for name, values in columns.items():
+                    file[f"prophesee/left/{name}"] = values
+    found = decode(path).events(**SIZE)
+    np.testing.assert_array_equal(rows(found), table)
+
+
+def test_disorder_is_sorted_stably_and_counted(tmp_path):
+    np.save(tmp_path / "a.npy", np.array([[5, 1, 0, 1], [3, 2, 0, 1], [5, 3, 0, 0], [4, 4, 0, 1]]))
+    found = decode(tmp_path / "a.npy", "txyp", "us")
+    assert found.disorder == 2
+    assert found.events(**SIZE).x.tolist() == [2, 4, 1, 3]
+
+
+def test_any_file_can_be_scored_like_a_reader(tmp_path, events):
+    path = tmp_path / "a.raw"
+    path.write_bytes(evt3(events))
+    with open_events(path, rows=20) as stream:
+        assert isinstance(stream, LoadedEvents)
+        assert stream.height == 20
+        assert len(stream) == int((events.y < 20).sum())
+        assert stream.extent_us == (stream.events.t[0], stream.events.t[-1] + 1)
+    events.save(tmp_path / "b.h5")
+    assert is_dsec(tmp_path / "b.h5")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.bag", b"#ROSBAG V2.0", "got a ROS bag; convert it"),
+        ("a.xyz", b"nothing known", "got none of them; convert it"),
+        ("a.raw", b"% evt 4.0\n% end\n", "got EVT4.0; convert it"),
+        ("a.aedat", b"#!AER-DAT2.0\n# AEChip: some.Chip\n", "got the chip CHIP"),
+        ("a.es", b"Event Stream\x03\x00\x00\x01" + bytes(8), "got version 3 and kind 1"),
+        ("a.bin", b"1234567", "whole events of 5 bytes"),
+        ("a.txt", b"one two three four\nfive", "Expected"),
+        ("a.npy", b"\x93NUMPY\x01", "arrays of events"),
+    ],
+)
+def test_what_cannot_be_read_is_named(tmp_path, name, content, said):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=said):
+        Events.load(tmp_path / name, **SIZE)
+
+
+@settings(max_examples=20, deadline=None)
+@given(data=st.data(), name=st.sampled_from(sorted(ENCODERS)))
+def test_damaged_files_give_a_sentence_or_events(tmp_path_factory, data, name):
+    made = np.random.default_rng(1)
+    stream = Events.from_arrays(
+        np.sort(made.integers(0, 9000, 60)), made.integers(0, WIDTH, 60),
+        made.integers(0, HEIGHT, 60), made.integers(0, 2, 60), **SIZE,
+    )  # fmt: skip
+    content = bytearray(ENCODERS[name](stream))
+    for at in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=8)):
+        content[at] = data.draw(st.integers(0, 255))
+    content = content[: data.draw(st.integers(0, len(content)))]
+    path = tmp_path_factory.mktemp("damaged") / name
+    path.write_bytes(bytes(content))
+    with contextlib.suppress(ValueError):  # whose sentence says what is wrong
+        assert len(Events.load(path, **SIZE)) <= 32 * len(content)
+
+
+def test_a_stream_is_described_in_words(events):
+    said = "\n".join(described("a file", 3, 2, events))
+    assert "sensor      64 x 48" in said
+    assert "events      500" in said
+    assert "disorder    3 events" in said
+    assert "dropped     2 events" in said
+    assert len(sketch(events).splitlines()) == 20
