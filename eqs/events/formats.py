@@ -12,16 +12,13 @@ from eqs.events.decoded import Decoded
 from eqs.events.loaded import LoadedEvents
 from eqs.events.raw import read_prophesee
 from eqs.events.reader import EventReader
+from eqs.events.ros import read_bag
 from eqs.events.tables import read_foreign_hdf5, read_numpy, read_text
 
 READ = (
     "DSEC, v2e, event_utils, MVSEC, M3ED and Metavision HDF5, RAW (EVT2, EVT2.1, EVT3), DAT, "
-    "AEDAT 2, 3.1 and 4, Event Stream, 40-bit .bin, npy, npz, text and CSV"
+    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, npy, npz, text and CSV"
 )
-ELSEWHERE = {
-    b"#ROSBAG": "a ROS bag", b"SQLite format 3": "a ROS 2 bag", b"\x89MCAP": "an MCAP file",
-    b"MATLAB 5": "a MATLAB file",
-}  # fmt: skip
 
 
 def open_events(
@@ -76,15 +73,15 @@ def decode(path: Path | str, order: str | None = None, time_unit: str | None = N
         return read_prophesee(path)
     for start, read in (
         (b"#!AER-DAT2", read_aedat2), (b"#!AER-DAT3", read_aedat3), (b"#!AER-DAT4", read_aedat4),
-        (HEADER, read_event_stream),
+        (HEADER, read_event_stream), (b"#ROSBAG", read_bag), (b"SQLite format 3", read_bag),
+        (b"\x89MCAP", read_bag),
     ):  # fmt: skip
         if first.startswith(start):
             return read(path)
     if first[:6] == b"\x93NUMPY" or (first[:4] == b"PK\x03\x04" and path.suffix == ".npz"):
         return read_numpy(path, order, time_unit)
-    for start, kind in ELSEWHERE.items():
-        if first.startswith(start):
-            raise ValueError(f"Expected {READ} in {path}, got {kind}; convert it to one of these")
+    if first.startswith(b"MATLAB 5"):
+        raise ValueError(f"Expected {READ} in {path}, got a MATLAB file; save it as npz or CSV")
     if path.suffix == ".bin":
         return read_forty_bits(path)
     if path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv", ".dat"):

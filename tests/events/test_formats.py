@@ -250,7 +250,6 @@ def test_any_file_can_be_scored_like_a_reader(tmp_path, events):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.bag", b"#ROSBAG V2.0", "got a ROS bag; convert it"),
         ("a.xyz", b"nothing known", "got none of them; convert it"),
         ("a.raw", b"% evt 4.0\n% end\n", "got EVT4.0; convert it"),
         ("a.aedat", b"#!AER-DAT2.0\n# AEChip: some.Chip\n", "got the chip CHIP"),

@@ -210,9 +210,7 @@ def test_foreign_file(tmp_path):
     with pytest.raises(ValueError, match="whole HDF5 file"):
         Events.load(tmp_path / "text.h5")
     path = plain_file(tmp_path / "e.h5", p=None, ms_to_idx=None)
-    with pytest.raises(
-        ValueError, match=r"p, t and ms_to_idx.*got events/t, events/x"
-    ):
+    with pytest.raises(ValueError, match=r"p, t and ms_to_idx.*got events/t, events/x"):
         Events.load(path)
 
 

@@ -1,0 +1,177 @@
+"""Events in ROS 1 and ROS 2 bags and MCAP files.
+
+Source: the message definitions of `event_camera_msgs`, `event_array_msgs` and `dvs_msgs`, and the
+serialisation rules of ROS 1 and of CDR.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eqs.events.decoded import Decoded, unwrapped
+from eqs.events.raw import evt3
+from eqs.extras import needed
+
+PACKET = ("event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray")
+ARRAY = ("dvs_msgs/msg/EventArray", "prophesee_event_msgs/msg/EventArray")
+ROS1 = b"#ROSBAG"
+
+
+class Message:
+    """Reads one message's bytes field by field.
+
+    Args:
+        raw: the bytes.
+        ros1: whether fields follow each other without gaps, as in ROS 1; CDR aligns them.
+    """
+
+    def __init__(self, raw: bytes, *, ros1: bool) -> None:
+        """Begin at the first field."""
+        self.raw, self.ros1 = raw, ros1
+        self.start = self.at = 0 if ros1 else 4
+
+    def number(self, size: int) -> int:
+        """The next whole number of so many bytes.
+
+        Raises:
+            ValueError: the message ends before.
+        """
+        if not self.ros1:
+            self.at = self.start + -(-(self.at - self.start) // size) * size
+        value = self.raw[self.at : self.at + size]
+        if len(value) < size:
+            raise ValueError("Expected whole messages, got one that was cut off; record it again")
+        self.at += size
+        return int.from_bytes(value, "little")
+
+    def text(self) -> str:
+        """The next text."""
+        return self.bytes().rstrip(b"\0").decode("latin-1")
+
+    def bytes(self) -> bytes:
+        """The next row of bytes."""
+        count = self.number(4)
+        self.at += count
+        return bytes(self.raw[self.at - count : self.at])
+
+    def header(self) -> tuple[int, int]:
+        """Skip the stamp, and give height and width, which follow it."""
+        if self.ros1:
+            self.number(4)
+        self.number(4), self.number(4), self.text()
+        return self.number(4), self.number(4)
+
+
+def read_bag(path: Path) -> Decoded:
+    """Events of the only topic with events in a bag.
+
+    Raises:
+        ValueError: there is none, or there are several, or their encoding is not read here; or
+            rosbags, the optional dependency `ros`, is not installed.
+    """
+    with needed("ros", f"to read {path}"):
+        from rosbags.rosbag1 import Reader as Reader1
+        from rosbags.rosbag1 import ReaderError as Error1
+        from rosbags.rosbag2 import Reader as Reader2
+        from rosbags.rosbag2 import ReaderError as Error2
+    with path.open("rb") as file:
+        ros1 = file.read(len(ROS1)) == ROS1
+    try:
+        with (Reader1 if ros1 else Reader2)(path) as reader:
+            found = [c for c in reader.connections if c.msgtype in (*PACKET, *ARRAY)]
+            if len(found) != 1:
+                held = ", ".join(f"{c.topic} ({c.msgtype})" for c in reader.connections)
+                raise ValueError(
+                    f"Expected one topic of events ({', '.join((*PACKET, *ARRAY))}) in {path}, "
+                    f"got {held or 'none'}; write the one that is meant into a bag of its own"
+                )
+            messages = (bytes(raw) for _, _, raw in reader.messages(connections=found))
+            read = packets if found[0].msgtype in PACKET else arrays
+            return read(messages, path, ros1=ros1)
+    except (Error1, Error2) as error:
+        raise ValueError(f"Expected a whole bag at {path}, got: {error}") from error
+
+
+def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Decoded:
+    """Events of packets: a camera's own encoding, or `mono`."""
+    parts: list[bytes] = []
+    bases: list[NDArray[np.int64]] = []
+    height = width = 0
+    encoding = ""
+    for raw in messages:
+        message = Message(raw, ros1=ros1)
+        height, width = message.header()
+        message.number(8)
+        base_ns, encoding = message.number(8), message.text()
+        message.number(1)
+        parts.append(message.bytes())
+        bases.append(np.full(len(parts[-1]) // 8, base_ns, np.int64))
+    content = b"".join(parts)
+    dropped = 0
+    if encoding == "evt3":
+        t, x, y, p, dropped = evt3(np.frombuffer(content[: len(content) // 2 * 2], "<u2"))
+    elif encoding == "mono":
+        words = np.frombuffer(content[: len(content) // 8 * 8], "<u8")
+        t = (np.concatenate(bases) + (words & np.uint64(0xFFFFFFFF)).astype(np.int64)) // 1000
+        place = (words >> np.uint64(32)).astype(np.int64)
+        x, y, p = place & 0x7FFF, place >> 16 & 0x7FFF, place >> 31
+    elif encoding == "libcaer":
+        pairs = np.frombuffer(content[: len(content) // 8 * 8], "<u4").reshape(-1, 2)
+        pairs = pairs[pairs[:, 0] & 1 == 1].astype(np.int64)  # the others were marked as none
+        t = unwrapped(pairs[:, 1], 1 << 31)
+        x, y, p = pairs[:, 0] >> 17, pairs[:, 0] >> 2 & 0x7FFF, pairs[:, 0] >> 1 & 1
+    else:
+        raise ValueError(
+            f"Expected packets of evt3, mono or libcaer in {path}, got {encoding or 'none'}; "
+            "convert them with event_camera_tools"
+        )
+    return Decoded(
+        kind=f"a bag of event packets ({encoding})", t=t, x=x, y=y, p=p,
+        height=height, width=width, dropped=dropped,
+    )  # fmt: skip
+
+
+def arrays(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Decoded:
+    """Events of arrays, each with a time of its own."""
+    parts: list[NDArray[Any]] = []
+    height = width = 0
+    for raw in messages:
+        message = Message(raw, ros1=ros1)
+        height, width = message.header()
+        count = message.number(4)
+        parts.append(_records(message, count, ros1=ros1))
+    fields = np.concatenate(parts) if parts else np.zeros((0, 5), np.int64)
+    t = fields[:, 2] * 1_000_000 + fields[:, 3] // 1000
+    return Decoded(
+        kind="a bag of event arrays", t=t, x=fields[:, 0], y=fields[:, 1], p=fields[:, 4],
+        height=height or None, width=width or None,
+    )  # fmt: skip
+
+
+def _records(message: Message, count: int, *, ros1: bool) -> NDArray[np.int64]:
+    """The fields x, y, seconds, nanoseconds and polarity of so many events.
+
+    Convention: CDR aligns every number by itself, so the first event differs from the others: its
+    seconds follow x and y at once, theirs come after two bytes more.
+    """
+    packed = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p", "u1")])
+    if ros1:
+        whole = min(count, (len(message.raw) - message.at) // packed.itemsize)
+        table = np.frombuffer(message.raw, packed, whole, message.at)
+        return np.stack([table[name].astype(np.int64) for name in packed.names or ()], axis=1)
+    rows = [[message.number(size) for size in (2, 2, 4, 4, 1)] for _ in range(min(count, 1))]
+    spread = np.dtype(
+        {"names": ["x", "y", "s", "ns", "p"], "formats": ["<u2", "<u2", "<u4", "<u4", "u1"],
+         "offsets": [0, 2, 6, 10, 14], "itemsize": 16}
+    )  # fmt: skip
+    at = message.at + (message.at - message.start) % 2
+    rest = max(0, min(count - 1, (len(message.raw) - at + 1) // spread.itemsize))
+    body = message.raw[at : at + rest * spread.itemsize].ljust(rest * spread.itemsize, b"\0")
+    table = np.frombuffer(body, spread, rest)
+    others = np.stack([table[name].astype(np.int64) for name in spread.names or ()], axis=1)
+    return np.concatenate([np.array(rows, np.int64).reshape(-1, 5), others])
