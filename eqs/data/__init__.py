@@ -1,6 +1,7 @@
 """Data sets on disk: recordings, labels, simulated streams."""
 
 from eqs.data.dsec import DSECFolder, RecordingFolder, parse_size
+from eqs.data.given import GivenEvents, GivenStreams
 from eqs.data.labels import LabelProtocol, detector_rows
 from eqs.data.recording import Recording
 from eqs.data.simulated import EventSource, RecordedEvents, SimulatedEvents
@@ -9,6 +10,8 @@ from eqs.data.windows import detection_windows, seen_between_frames
 __all__ = [
     "DSECFolder",
     "EventSource",
+    "GivenEvents",
+    "GivenStreams",
     "LabelProtocol",
     "RecordedEvents",
     "Recording",

@@ -10,6 +10,8 @@ from omegaconf import DictConfig
 from eqs.data import (
     DSECFolder,
     EventSource,
+    GivenEvents,
+    GivenStreams,
     RecordedEvents,
     RecordingFolder,
     SimulatedEvents,
@@ -20,20 +22,23 @@ Dataset = DSECFolder | RecordingFolder
 
 
 def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:
-    """The events a configured simulator makes, or the recorded ones.
+    """The events a configured simulator makes, given ones, or the recorded ones.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: it is none of these.
     """
     built = instantiate(simulator)
     if isinstance(built, RecordedEvents):
         return built
+    root = Path(cfg.paths.simulated) / cfg.data.name
+    if isinstance(built, GivenEvents):
+        return GivenStreams(built, root)
     if not isinstance(built, Simulator):
         raise ValueError(
             f"Expected a simulator or the recorded events, got a {type(built).__name__} from "
             f"{simulator.get('_target_')}; set sim=esim, sim=real or another of configs/sim"
         )
-    return SimulatedEvents(built, Path(cfg.paths.simulated) / cfg.data.name)
+    return SimulatedEvents(built, root)
 
 
 def dataset(cfg: DictConfig) -> Dataset:

@@ -128,7 +128,11 @@ def test_a_readout_holds_for_every_simulator_of_an_evaluation():
 
 
 def test_every_simulator_has_a_parameter_file():
-    assert {path.stem for path in (CONFIGS / "sim").glob("*.yaml")} == {*SIMULATORS, "real"}
+    assert {path.stem for path in (CONFIGS / "sim").glob("*.yaml")} == {
+        *SIMULATORS,
+        "real",
+        "files",
+    }
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
