@@ -141,3 +141,22 @@ def test_official_splits():
     }
     assert len({name for chosen in dealt.values() for name in chosen}) == 60
     assert {"thun_02_a", "interlaken_00_a", "zurich_city_13_b"} < set(dealt["test"])
+
+
+def test_sequences_come_by_number(tmp_path, make_recording):
+    for name in ("train_10", "train_9", "train_b"):
+        make_recording(tmp_path / name)
+    assert [each.name for each in folder(tmp_path).recordings("train")] == [
+        "train_9",
+        "train_10",
+        "train_b",
+    ]
+
+
+def test_recordings_with_frames_of_another_suffix_are_not_skipped(tmp_path, make_recording):
+    path = make_recording(tmp_path / "whole", tracks=None)
+    for frame in (path / "images/left/distorted").iterdir():
+        frame.rename(frame.with_suffix(".BMP"))
+    data = RecordingFolder(name="recordings", root=tmp_path)
+    assert data.skipped == {}
+    assert len(data.all_recordings()[0].frame_paths) == 6
