@@ -12,6 +12,7 @@ from eqs.frames.interpolation import (
 )
 from eqs.frames.luma import GreyImage, luma
 from eqs.frames.order import by_name
+from eqs.frames.remapping import View, remapped
 from eqs.frames.video import VideoFile
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "LinearInterpolation",
     "NetworkInterpolation",
     "VideoFile",
+    "View",
     "by_name",
     "checked_frames",
     "checked_times",
@@ -32,4 +34,5 @@ __all__ = [
     "image_size",
     "luma",
     "read_image",
+    "remapped",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,8 @@ class FrameFolder:
     that order.
 
     Args:
-        folder: folder of images of one size and depth, all grey or all in colour.
+        images: folder of images of one size and depth, all grey or all in colour, or their files in
+            order.
         timestamps_us: time of each frame, strictly increasing, int64 microseconds.
         chunk: frames to hold in memory at once.
         white: level that is white in floating images.
@@ -52,7 +53,7 @@ class FrameFolder:
 
     def __init__(
         self,
-        folder: Path | str,
+        images: Path | str | Sequence[Path],
         timestamps_us: NDArray[np.int64],
         chunk: int = 8,
         white: float | None = None,
@@ -60,13 +61,14 @@ class FrameFolder:
         """List the images and check that the times fit them."""
         if chunk < 1:
             raise ValueError(f"Expected at least one frame per chunk, got {chunk}; set chunk=8")
-        self.paths = image_paths(folder)
+        self.paths = image_paths(images) if isinstance(images, Path | str) else list(images)
         self.chunk, self.white = chunk, white
         given = np.shape(timestamps_us)
         if given != (len(self.paths),):
             raise ValueError(
-                f"Expected one time for each of the {len(self.paths)} images in {folder}, got "
-                f"times shaped {given}; check the timestamp file beside the images"
+                f"Expected one time for each of the {len(self.paths)} images in "
+                f"{self.paths[0].parent}, got times shaped {given}; check the timestamp file "
+                "beside the images"
             )
         self.timestamps_us = checked_times(timestamps_us, len(self.paths))
 
