@@ -1,6 +1,8 @@
 """Data sets on disk: recordings, labels, simulated streams."""
 
+from eqs.data.dataset import Dataset
 from eqs.data.dsec import DSECFolder, RecordingFolder, parse_size
+from eqs.data.event_view import EventView
 from eqs.data.given import GivenEvents, GivenStreams
 from eqs.data.labels import LabelProtocol, detector_rows
 from eqs.data.recording import Recording
@@ -9,7 +11,9 @@ from eqs.data.windows import detection_windows, seen_between_frames
 
 __all__ = [
     "DSECFolder",
+    "Dataset",
     "EventSource",
+    "EventView",
     "GivenEvents",
     "GivenStreams",
     "LabelProtocol",

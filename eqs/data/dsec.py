@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Protocol
 
-from eqs.data.recording import EVENTS, FRAMES, Recording, frames_in
-from eqs.frames import by_name
+from eqs.data.dataset import Dataset
+from eqs.data.event_view import EventView
+from eqs.data.places import EVENTS, FRAMES, Places, find_sequences
+from eqs.data.recording import Recording, frames_in
 
 log = logging.getLogger(__name__)
-SPLIT_FOLDERS = ("train", "val", "test")
+SCORED = "scored"
 
 
 class Generator(Protocol):
@@ -28,10 +30,10 @@ class Generator(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DSECFolder:
+class DSECFolder(Dataset):
     """A labelled data set: sequences below one root, dealt to splits by their names.
 
-    Sequences may lie in `root/train`, `root/val` and `root/test` or directly in `root`; which
+    Sequences may lie below the root in any of DSEC's three layouts, see `eqs.data.places`; which
     split they belong to is said by `splits` alone, since DSEC keeps its validation sequences among
     the training ones.
 
@@ -43,6 +45,9 @@ class DSECFolder:
         generator: what makes the data set on first use, if it can be made.
         crop_rows: number of rows, counted from the top, that are used; all of them if None.
         exhaustive_labels: whether a frame without a label is known to show no object.
+        scored: patterns of the sequences that simulators are scored on; the test split if None.
+        first_frames: how many frames of each scored sequence count; all of them if None.
+        event_view: where the frames that are rectified go as the event camera would see them.
 
     Raises:
         ValueError: the size cannot be read or the crop does not fit it.
@@ -55,6 +60,9 @@ class DSECFolder:
     generator: Generator | None = None
     crop_rows: int | None = None
     exhaustive_labels: bool = False
+    scored: Sequence[str] | None = None
+    first_frames: int | None = None
+    event_view: EventView | None = None
 
     def __post_init__(self) -> None:
         """Check the size before anything is generated with it."""
@@ -64,6 +72,16 @@ class DSECFolder:
                 f"Expected data.crop_rows between 1 and {rows}, got {self.crop_rows}; "
                 "null uses all rows"
             )
+
+    @property
+    def split_names(self) -> Sequence[str]:
+        """The splits that `splits` names."""
+        return tuple(self.splits)
+
+    @property
+    def sensor_hash(self) -> str | None:
+        """What identifies the rendered camera, where the data set is generated."""
+        return None if self.generator is None else self.generator.sensor_hash
 
     @property
     def height(self) -> int:
@@ -85,19 +103,21 @@ class DSECFolder:
         root = Path(self.root)
         if self.generator is not None:
             self.generator.generate(root)
-        found = _existing_sequences(root)
-        for split, patterns in self.splits.items():
+        found = self._found()
+        for split, patterns in self._named().items():
             for pattern in patterns:
                 if not any(fnmatchcase(name, pattern) for name in found):
                     log.warning("%s has no sequence %s of the %s split", root, pattern, split)
 
-    def folders(self) -> dict[str, list[Path]]:
-        """The folders of the sequences of each split, which may be none."""
-        found = _existing_sequences(Path(self.root))
-        return {
-            split: [path for name, path in found.items() if any(fnmatchcase(name, p) for p in each)]
-            for split, each in self.splits.items()
-        }
+    def make_frames(self) -> None:
+        """Bring rectified frames of all splits into the event camera's view, where none are."""
+        if self.event_view is not None:
+            chosen = {each.name: each for split in self._named() for each in self._chosen(split)}
+            self.event_view.prepare(list(chosen.values()))
+
+    def sequences(self) -> dict[str, list[Places]]:
+        """Where the sequences of each split lie, which may be none."""
+        return {split: self._chosen(split) for split in self.splits}
 
     def recordings(self, split: str) -> list[Recording]:
         """The recordings of one split, by name.
@@ -105,31 +125,59 @@ class DSECFolder:
         Raises:
             ValueError: there is no such split, or no sequence belongs to it.
         """
-        if split not in self.splits:
+        if split not in self._named():
             raise ValueError(
                 f"Expected one of the splits {', '.join(self.splits)}, got {split!r}; "
                 "set data.splits"
             )
-        chosen = self.folders()[split]
+        chosen = self._chosen(split)
         if not chosen:
-            found = ", ".join(_existing_sequences(Path(self.root)))
+            found = ", ".join(self._found())
             raise ValueError(
-                f"Expected sequences named {', '.join(self.splits[split])} for the {split} split "
+                f"Expected sequences named {', '.join(self._named()[split])} for the {split} split "
                 f"in {self.root}, got {found}; set data.root or data.splits"
             )
-        return [self.load(folder) for folder in chosen]
+        return [self.load(places) for places in chosen]
 
-    def load(self, folder: Path) -> Recording:
-        """The recording in a folder, of the sensor's size."""
-        return Recording.load(folder, *parse_size(self.size))
+    def load(self, sequence: Places) -> Recording:
+        """The recording of a sequence, of the sensor's size."""
+        return Recording.at(sequence, *parse_size(self.size))
 
-    def all_recordings(self) -> list[Recording]:
-        """The recordings of every split."""
-        return [recording for split in self.splits for recording in self.recordings(split)]
+    def scored_recordings(self) -> list[Recording]:
+        """The recordings that simulators are scored on."""
+        found = self.recordings(SCORED if self.scored is not None else "test")
+        count = self.first_frames
+        return found if count is None else [each.first_frames(count) for each in found]
+
+    def _found(self) -> dict[str, Places]:
+        root = Path(self.root)
+        if self.generator is not None and not root.is_dir():
+            raise FileNotFoundError(
+                f"Expected {self.name} at {root}, which is rendered on first use; type python "
+                "scripts/prepare.py first, or set data.root"
+            )
+        return find_sequences(root)
+
+    def _named(self) -> dict[str, Sequence[str]]:
+        """Patterns of every group of sequences."""
+        scored = {} if self.scored is None else {SCORED: self.scored}
+        return {**self.splits, **scored}
+
+    def _chosen(self, group: str) -> list[Places]:
+        found = self._found()
+        patterns = self._named()[group]
+        chosen = [found[name] for name in found if any(fnmatchcase(name, p) for p in patterns)]
+        return [self._viewed(places) for places in chosen]
+
+    def _viewed(self, places: Places) -> Places:
+        """The places of a sequence, with remapped frames where it came without."""
+        if self.event_view is None or frames_in(places.frames):
+            return places
+        return self.event_view.places(places)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordingFolder:
+class RecordingFolder(Dataset):
     """Recordings without labels: enough to score simulators, too little to train.
 
     The size of each sensor is that of its frames. Recordings without frames cannot be simulated
@@ -144,6 +192,11 @@ class RecordingFolder:
     name: str
     root: Path | str
     crop_rows: int | None = None
+
+    @property
+    def split_names(self) -> Sequence[str]:
+        """Test data only."""
+        return ("test",)
 
     def prepare(self) -> None:
         """Check that there is something to score, and say what is left out.
@@ -161,8 +214,8 @@ class RecordingFolder:
         """Name of each recording that is left out, and why."""
         return {
             name: reason
-            for name, path in _existing_sequences(Path(self.root)).items()
-            if (reason := _reason_to_skip(path))
+            for name, places in find_sequences(Path(self.root)).items()
+            if (reason := _reason_to_skip(places))
         }
 
     def recordings(self, split: str = "test") -> list[Recording]:
@@ -176,26 +229,22 @@ class RecordingFolder:
                 f"Expected the test split of the unlabelled recordings in {self.root}, got "
                 f"{split!r}; set data to a labelled data set to train"
             )
-        found, skipped = _existing_sequences(Path(self.root)), self.skipped
+        found, skipped = find_sequences(Path(self.root)), self.skipped
         if len(skipped) == len(found):
             reasons = "; ".join(f"{name} {reason}" for name, reason in skipped.items())
             raise ValueError(
                 f"Expected recordings with frames and events in {self.root}, got none ({reasons}); "
                 "set data.root"
             )
-        return [self.load(path) for name, path in found.items() if name not in skipped]
+        return [self.load(places) for name, places in found.items() if name not in skipped]
 
-    def folders(self) -> dict[str, list[Path]]:
-        """The folders of all recordings, those that are left out among them."""
-        return {"test": list(_existing_sequences(Path(self.root)).values())}
+    def sequences(self) -> dict[str, list[Places]]:
+        """Where all recordings lie, those that are left out among them."""
+        return {"test": list(find_sequences(Path(self.root)).values())}
 
-    def load(self, folder: Path) -> Recording:
-        """The recording in a folder, of its own size."""
-        return Recording.load(folder)
-
-    def all_recordings(self) -> list[Recording]:
-        """All recordings with frames and events."""
-        return self.recordings()
+    def load(self, sequence: Places) -> Recording:
+        """The recording of a sequence, of its own size."""
+        return Recording.at(sequence)
 
 
 def parse_size(size: str) -> tuple[int, int]:
@@ -214,37 +263,7 @@ def parse_size(size: str) -> tuple[int, int]:
     return int(parts[1]), int(parts[0])
 
 
-def _existing_sequences(root: Path) -> dict[str, Path]:
-    """Folder of each sequence below a root, by name."""
-    if not root.is_dir():
-        raise FileNotFoundError(
-            f"Expected a data set at {root}, found no such folder; set data.root"
-        )
-    found: dict[str, Path] = {}
-    for path in by_name(_sequence_folders(root)):
-        if path.name in found:
-            raise ValueError(
-                f"Expected each sequence once below {root}, got {path.name} in "
-                f"{found[path.name].parent} and {path.parent}; remove one"
-            )
-        found[path.name] = path
-    if not found:
-        raise ValueError(
-            f"Expected sequences in the layout of DSEC below {root}, found none; set data.root to "
-            "the folder that holds them, or that of train/ and test/"
-        )
-    return found
-
-
-def _sequence_folders(root: Path) -> Iterator[Path]:
-    for parent in (root, *(root / split for split in SPLIT_FOLDERS)):
-        for path in parent.iterdir() if parent.is_dir() else ():
-            complete = not path.name.endswith(".partial")
-            if complete and ((path / "events").is_dir() or (path / "images").is_dir()):
-                yield path
-
-
-def _reason_to_skip(path: Path) -> str | None:
-    if not frames_in(path):
+def _reason_to_skip(places: Places) -> str | None:
+    if not frames_in(places.frames):
         return f"has no frames in {FRAMES}"
-    return None if (path / EVENTS).exists() else f"has no events in {EVENTS}"
+    return None if places.events.exists() else f"has no events in {EVENTS}"

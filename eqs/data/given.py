@@ -11,7 +11,8 @@ from pathlib import Path
 from rich.progress import track
 
 from eqs.content import content_hash, content_hashes
-from eqs.data.recording import EVENTS, Recording
+from eqs.data.places import EVENTS
+from eqs.data.recording import Recording
 from eqs.events import Events
 from eqs.files import one_at_a_time, read_json, short_hash, write_json
 

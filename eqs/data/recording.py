@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,34 +10,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.content import content_hash, content_hashes
+from eqs.data.places import CALIBRATION, EVENTS, FRAME_TIMES, FRAMES, Places
 from eqs.files import short_hash, whole_numbers
-from eqs.frames import IMAGE_SUFFIXES, checked_times, image_paths, image_size, read_image
+from eqs.frames import (
+    IMAGE_SUFFIXES,
+    FrameFolder,
+    checked_times,
+    image_paths,
+    image_size,
+    read_image,
+)
 
-EVENTS = Path("events/left/events.h5")
-FRAMES = Path("images/left/distorted")
-FRAME_TIMES = Path("images/timestamps.txt")
-EXPOSURES = Path("images/left/exposure_timestamps.txt")
-TRACKS = Path("object_detections/left/tracks.npy")
 TRACK_FIELDS = ("t", "x", "y", "w", "h", "class_id")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recording:
-    """What a sequence folder holds, with everything but frames and events already read.
+    """What belongs to one sequence, with everything but frames and events already read.
 
     Convention: all times are on the recording's own clock, so a label's time equals its frame's.
     The frames are those in the distorted view, pixel for pixel that of the event sensor.
 
     Args:
         name: the sequence's name.
-        folder: the sequence's folder.
+        folder: the folder that is named where something is wrong.
         height: rows of the sensor and of the frames.
         width: columns of the sensor and of the frames.
         frame_times_us: middle of each frame's exposure, int64, rising, shape (frames,).
+        events_path: the file of the recorded events, in the layout of DSEC.
         frame_paths: the frames' files in order; empty where the recording has no frames.
         exposures_us: start and end of each frame's exposure, int64, shape (frames, 2), if known.
         tracks: labelled boxes sorted by time, with at least the fields t, x, y, w, h and class_id;
             None where the recording has no labels.
+        label_paths: the files that the labels were read from.
+        without_frames: why there are no frames, and what to do about it.
     """
 
     name: str
@@ -45,32 +51,44 @@ class Recording:
     height: int
     width: int
     frame_times_us: NDArray[np.int64]
+    events_path: Path
     frame_paths: tuple[Path, ...] = ()
     exposures_us: NDArray[np.int64] | None = None
     tracks: NDArray[np.void] | None = None
+    label_paths: tuple[Path, ...] = ()
+    without_frames: str = "got none; set data.root to recordings with frames, or sim=real"
 
     @classmethod
     def load(
         cls, folder: Path | str, height: int | None = None, width: int | None = None
     ) -> Recording:
-        """Read a sequence folder; without a given size the first frame tells the sensor's.
+        """Read a sequence in a folder of its own, see `at`.
 
         Raises:
             FileNotFoundError: the folder does not exist.
-            ValueError: the folder holds neither events nor frames, frames and timestamps do not
-                fit, there is only one frame, the frames have another size than given, the size is
-                unknown, or the labels cannot be read.
+            ValueError: as `at` says.
         """
         folder = Path(folder)
         if not folder.is_dir():
             raise FileNotFoundError(f"Expected a recording at {folder}, found none; set data.root")
-        paths = frames_in(folder)
-        if not paths and not (folder / EVENTS).exists():
+        return cls.at(Places.inside(folder), height, width)
+
+    @classmethod
+    def at(cls, places: Places, height: int | None = None, width: int | None = None) -> Recording:
+        """Read a sequence; without a given size the first frame tells the sensor's.
+
+        Raises:
+            ValueError: there are neither events nor frames, frames and timestamps do not fit, there
+                is only one frame, the frames have another size than given, the size is unknown, or
+                the labels cannot be read.
+        """
+        folder, paths = places.folder, frames_in(places.frames)
+        if not paths and not places.events.exists():
             raise ValueError(
                 f"Expected {EVENTS} or images in {FRAMES} in {folder}, found neither; "
                 "set data.root to a folder of recordings in the layout of DSEC"
             )
-        times_us = _frame_times(folder, len(paths))
+        times_us = _frame_times(places.frame_times, len(paths))
         if paths:
             height, width = _frame_size(paths[0], height, width)
         if height is None or width is None:
@@ -78,31 +96,63 @@ class Recording:
                 f"Expected a sensor size for {folder}, which has no frames to tell it; "
                 "set data.size"
             )
-        return cls(
-            name=folder.name,
+        labels = places.tracks
+        found = cls(
+            name=places.name,
             folder=folder,
             height=height,
             width=width,
             frame_times_us=times_us,
+            events_path=places.events,
             frame_paths=paths,
-            exposures_us=_exposures(folder, len(times_us)),
-            tracks=_tracks(folder, times_us),
+            exposures_us=_exposures(places.exposures, len(times_us)),
+            tracks=_tracks(labels, times_us) if labels.exists() else None,
+            label_paths=(labels,) if labels.exists() else (),
         )
+        rectified = not paths and bool(frames_in(places.rectified))
+        return replace(found, without_frames=_rectified_alone(places)) if rectified else found
 
-    @property
-    def events_path(self) -> Path:
-        """The file of the recorded events."""
-        return self.folder / EVENTS
+    def first_frames(self, count: int) -> Recording:
+        """The recording up to and with its frame `count`, as a recording of its own name.
 
-    @property
-    def frame_folder(self) -> Path:
-        """The folder of the frames."""
-        return self.folder / FRAMES
+        Raises:
+            ValueError: fewer than two frames are asked for.
+        """
+        if count < 2:
+            raise ValueError(
+                f"Expected at least two frames of {self.name}, got {count}; set data.first_frames"
+            )
+        if len(self.frame_times_us) <= count:
+            return self
+        tracks = self.tracks
+        if tracks is not None:
+            tracks = tracks[tracks["t"] <= self.frame_times_us[count - 1]]
+        exposures = None if self.exposures_us is None else self.exposures_us[:count]
+        return replace(
+            self,
+            name=f"{self.name}_first{count}",
+            frame_times_us=self.frame_times_us[:count],
+            frame_paths=self.frame_paths[:count],
+            exposures_us=exposures,
+            tracks=tracks,
+        )
 
     @property
     def has_frames(self) -> bool:
         """Whether there are frames to simulate from."""
         return len(self.frame_paths) > 0
+
+    def frames(self) -> FrameFolder:
+        """The frames with their times, a few at a time.
+
+        Raises:
+            ValueError: there are none.
+        """
+        if not self.has_frames:
+            raise ValueError(
+                f"Expected frames of {self.name} to simulate from, {self.without_frames}"
+            )
+        return FrameFolder(self.frame_paths, self.frame_times_us)
 
     def frames_hash(self) -> str:
         """What a simulator is fed with: the content of the frames, and their times."""
@@ -110,9 +160,9 @@ class Recording:
 
     def content_hash(self) -> str:
         """Everything that a training, a score or a test takes from this recording, by content."""
-        files = (self.events_path, self.folder / TRACKS)
-        held = [content_hash(file) if file.is_file() else None for file in files]
-        return short_hash([self.name, self.frames_hash(), *held])
+        events = content_hash(self.events_path) if self.events_path.is_file() else None
+        labels: list[str | None] = [*content_hashes(self.label_paths)] or [None]
+        return short_hash([self.name, self.frames_hash(), events, *labels])
 
     @property
     def has_labels(self) -> bool:
@@ -135,36 +185,48 @@ class Recording:
         return frame
 
 
-def frames_in(folder: Path) -> tuple[Path, ...]:
-    """The frames of a sequence folder in their order; none where it has none.
+def frames_in(place: Path) -> tuple[Path, ...]:
+    """The frames of a folder in their order; none where it has none, or does not exist.
 
     Raises:
         ValueError: their names admit two orders.
     """
-    place = folder / FRAMES
     if not place.is_dir() or not any(p.suffix.lower() in IMAGE_SUFFIXES for p in place.iterdir()):
         return ()
     return tuple(image_paths(place))
 
 
-def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
-    path = folder / FRAME_TIMES
+def _rectified_alone(places: Places) -> str:
+    if not places.calibration.exists():
+        return (
+            f"got only rectified ones in {places.rectified} and no {CALIBRATION} to remap them by; "
+            "unpack that, or DSEC-Detection's distorted images"
+        )
+    return (
+        f"got only rectified ones in {places.rectified}; type eqs prepare data=dsec "
+        "data.root=PATH, which remaps them into the view of the event camera, or unpack "
+        "DSEC-Detection's distorted images"
+    )
+
+
+def _frame_times(path: Path, frames: int) -> NDArray[np.int64]:
     if not path.exists():
         if frames:
             raise ValueError(
-                f"Expected {FRAME_TIMES} beside the {frames} frames of {folder}, found none; "
-                "add the time of each frame in microseconds, one a line"
+                f"Expected the times of {frames} frames at {path}, found none; add the time of "
+                "each frame in microseconds, one a line"
             )
         return np.empty(0, np.int64)
     times_us = whole_numbers(path).reshape(-1)
     if frames == 1 or len(times_us) == 1:
         raise ValueError(
-            f"Expected at least two frames in {folder}, got one; a single frame moves nothing"
+            f"Expected at least two frames and times in {path}, got one; a single frame moves "
+            "nothing"
         )
     if frames and len(times_us) != frames:
         raise ValueError(
-            f"Expected one timestamp per frame in {folder}, got {len(times_us)} lines in "
-            f"{FRAME_TIMES} and {frames} frames; complete the recording"
+            f"Expected one timestamp per frame, got {len(times_us)} lines in {path} and {frames} "
+            "frames; complete the recording"
         )
     if len(times_us) and times_us[0] < 0:
         raise ValueError(
@@ -177,8 +239,7 @@ def _frame_times(folder: Path, frames: int) -> NDArray[np.int64]:
         raise ValueError(f"{error} (in {path})") from error
 
 
-def _exposures(folder: Path, frames: int) -> NDArray[np.int64] | None:
-    path = folder / EXPOSURES
+def _exposures(path: Path, frames: int) -> NDArray[np.int64] | None:
     if not path.exists():
         return None
     exposures_us = whole_numbers(path)
@@ -200,10 +261,7 @@ def _frame_size(path: Path, height: int | None, width: int | None) -> tuple[int,
     return found_height, found_width
 
 
-def _tracks(folder: Path, frame_times_us: NDArray[np.int64]) -> NDArray[np.void] | None:
-    path = folder / TRACKS
-    if not path.exists():
-        return None
+def _tracks(path: Path, frame_times_us: NDArray[np.int64]) -> NDArray[np.void]:
     try:
         tracks: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
@@ -223,7 +281,7 @@ def _tracks(folder: Path, frame_times_us: NDArray[np.int64]) -> NDArray[np.void]
         )
     if len(tracks) and not len(frame_times_us):
         raise ValueError(
-            f"Expected {FRAME_TIMES} beside the labels of {folder}, found none; add the time of "
-            "each labelled frame in microseconds, one a line"
+            f"Expected the times of the frames of the labels in {path}, found none; add "
+            f"{FRAME_TIMES}, the time of each labelled frame in microseconds, one a line"
         )
     return tracks[np.argsort(tracks["t"], kind="stable")]

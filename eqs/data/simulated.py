@@ -16,7 +16,7 @@ from eqs.content import content_hash
 from eqs.data.recording import Recording
 from eqs.events.writer import EventWriter
 from eqs.files import one_at_a_time, read_json, short_hash, write_json
-from eqs.frames import WHITE, FrameFolder
+from eqs.frames import WHITE
 from eqs.processors import available_cores, side_by_side
 from eqs.simulators import Simulator
 
@@ -96,8 +96,7 @@ class SimulatedEvents:
         blind = [recording for recording in recordings if not recording.has_frames]
         if blind:
             raise ValueError(
-                f"Expected frames to simulate from in {blind[0].frame_folder}, got none; "
-                "set data.root to recordings with frames, or sim=real"
+                f"Expected frames of {blind[0].name} to simulate from, {blind[0].without_frames}"
             )
         if not self._missing(recordings):
             return
@@ -113,8 +112,7 @@ class SimulatedEvents:
     def simulate(self, recording: Recording) -> None:
         """Write one recording's events and the manifest that says what they are."""
         path = self.path(recording)
-        frames = FrameFolder(recording.frame_folder, recording.frame_times_us)
-        _, events = write_stream(self.simulator, recording.name, frames, path)
+        _, events = write_stream(self.simulator, recording.name, recording.frames(), path)
         write_json(
             self._manifest_path(recording),
             {

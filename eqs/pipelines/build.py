@@ -8,17 +8,14 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 
 from eqs.data import (
-    DSECFolder,
+    Dataset,
     EventSource,
     GivenEvents,
     GivenStreams,
     RecordedEvents,
-    RecordingFolder,
     SimulatedEvents,
 )
 from eqs.simulators import Simulator
-
-Dataset = DSECFolder | RecordingFolder
 
 
 def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:

@@ -19,7 +19,6 @@ from scipy import optimize
 
 from eqs.data import Recording
 from eqs.events import EventReader, Events
-from eqs.frames import FrameFolder
 from eqs.metrics.baselines import baselines
 from eqs.metrics.grid import fewest_windows
 from eqs.pipelines.build import dataset
@@ -97,8 +96,8 @@ class Clip:
     @classmethod
     def of(cls, recording: Recording, rows: int | None, window_us: int) -> Clip:
         """Read a recording into memory."""
-        folder = FrameFolder(recording.frame_folder, recording.frame_times_us)
-        frames = folder.read(0, len(folder))
+        clip = recording.frames()
+        frames = clip.read(0, len(clip))
         size = recording.height, recording.width
         with EventReader(recording.events_path, *size, rows=rows) as reader:
             grid = recording_grid(recording, reader, window_us)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from hydra.utils import instantiate
@@ -14,9 +14,8 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from eqs.data import DSECFolder, LabelProtocol, Recording, seen_between_frames
+from eqs.data import Dataset, LabelProtocol, Recording, seen_between_frames
 from eqs.events import EventReader
-from eqs.pipelines.build import Dataset
 from eqs.pipelines.command import explained
 from eqs.processors import available_cores, side_by_side
 
@@ -57,12 +56,12 @@ class Inspection:
     window_us: int
     thorough: bool
 
-    def __call__(self, place: tuple[str, Path]) -> Finding:
-        """Look at the recording in a folder; whatever is wrong becomes a fault."""
-        split, folder = place
-        found = Finding(folder.name, split)
+    def __call__(self, place: tuple[str, Any]) -> Finding:
+        """Look at the recording of a sequence; whatever is wrong becomes a fault."""
+        split, places = place
+        found = Finding(places.name, split)
         try:
-            recording = self.data.load(folder)
+            recording = self.data.load(places)
         except (ValueError, OSError) as error:
             found.faults.append(str(error))
             return found
@@ -84,7 +83,7 @@ class Inspection:
             _, said = seen_between_frames(times, self.window_us)
             found.notes += [said] if said else []
         if not recording.has_frames:
-            found.notes.append("there are no frames to simulate from")
+            found.notes.append(f"there are no frames to simulate from: {recording.without_frames}")
         for index in self._some(len(recording.frame_paths)):
             try:
                 recording.read_frame(index)
@@ -157,21 +156,15 @@ def check(cfg: DictConfig) -> None:
         ValueError: a recording cannot be used.
     """
     data: Dataset = instantiate(cfg.data)
-    generator = data.generator if isinstance(data, DSECFolder) else None
-    if generator is not None and not Path(data.root).is_dir():
-        raise FileNotFoundError(
-            f"Expected {data.name} at {data.root}, which is rendered on first use; type python "
-            "scripts/prepare.py first, or set data.root"
-        )
     protocol: LabelProtocol = instantiate(cfg.protocol)
     look = Inspection(data=data, protocol=protocol, window_us=cfg.window_us, thorough=cfg.thorough)
-    places = [(split, path) for split, paths in data.folders().items() for path in paths]
+    places = [(split, each) for split, held in data.sequences().items() for each in held]
     workers = min(available_cores(), len(places)) or 1
     looked = side_by_side(partial(look), places, workers) if len(places) > 1 else map(look, places)
     findings = list(track(looked, description="checking", total=len(places)))
-    order = {(split, path.name): index for index, (split, path) in enumerate(places)}
+    order = {(split, each.name): index for index, (split, each) in enumerate(places)}
     findings.sort(key=lambda finding: order[finding.split, finding.name])
-    empty = [split for split, paths in data.folders().items() if not paths]
+    empty = [split for split, held in data.sequences().items() if not held]
     show(findings, empty, cfg.data.name, Console())
     faulty = [finding for finding in findings if finding.faults]
     if faulty or not findings:

@@ -12,11 +12,11 @@ from typing import Any
 from omegaconf import DictConfig
 from rich.console import Console
 
-from eqs.data import EventSource
+from eqs.data import Dataset, EventSource
 from eqs.files import short_hash
 from eqs.metrics.grid import fewest_windows
 from eqs.names import BASELINE
-from eqs.pipelines.build import Dataset, dataset, event_source
+from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import require_judge
 from eqs.pipelines.publish import Findings, publish
@@ -120,7 +120,7 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     """Score all systems, write every table and figure and the report."""
     times = phase_times(cfg)
     data = dataset(cfg)
-    recordings = data.recordings("test")
+    recordings = data.scored_recordings()
     systems = scored_systems(cfg, runs)
     scoring = find_scoring(cfg, data)  # first: without one, simulating would be in vain
     for source in systems.values():

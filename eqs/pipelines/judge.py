@@ -13,12 +13,11 @@ import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from eqs.data import DSECFolder
+from eqs.data import Dataset
 from eqs.events import EventReader
 from eqs.files import short_hash
 from eqs.metrics import Judge
 from eqs.metrics.judge_folder import RECORD
-from eqs.pipelines.build import Dataset
 from eqs.pipelines.recipe import data_hash, recipe_hash
 from eqs.pipelines.runs import Run, finished_runs
 
@@ -121,7 +120,8 @@ def _given_judge(cfg: DictConfig, data: Dataset | None) -> Found:
         kept = Judge.load(folder)
         made = tuple(centre for centre in kept.centres if centre.sha256 not in given)
         judge = replace(judge, centres=(*judge.centres, *made)) if given else kept
-    return Found(judge, folder, data if isinstance(data, DSECFolder) else None, given)
+    labelled = data is not None and "train" in data.split_names
+    return Found(judge, folder, data if labelled else None, given)
 
 
 def training_content(data: Dataset | None) -> str:

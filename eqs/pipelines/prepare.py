@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from omegaconf import DictConfig
 
-from eqs.data import EventSource
-from eqs.pipelines.build import Dataset, dataset, event_source
+from eqs.data import Dataset, EventSource
+from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.timing import PhaseTimes, phase_times
 
 
 @explained
 def prepare(cfg: DictConfig) -> None:
-    """Generate or check the data set, then run every configured simulator over it."""
+    """Generate or check the data set, make its frames, and run every configured simulator."""
     sources = [event_source(simulator, cfg) for simulator in cfg.simulators.values()]
     times = phase_times(cfg)
     data = prepare_data(cfg, times)
+    with times.measure("remap frames", resumed=True):
+        data.make_frames()
     for source in sources:
         prepare_stream(source, data, times)
+        source.prepare(data.scored_recordings())
 
 
 def prepare_data(cfg: DictConfig, times: PhaseTimes) -> Dataset:

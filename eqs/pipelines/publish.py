@@ -12,11 +12,10 @@ import pandas as pd
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from eqs.data import DSECFolder, EventSource, LabelProtocol, RecordedEvents, Recording
+from eqs.data import Dataset, EventSource, LabelProtocol, RecordedEvents, Recording
 from eqs.drawing import detection_panels, event_rate, events_panels, rate_curves, score_maps
 from eqs.metrics import Judge, Reading
 from eqs.metrics.grid import fewest_windows
-from eqs.pipelines.build import Dataset
 from eqs.pipelines.runs import Run
 from eqs.pipelines.score import Scores
 from eqs.pipelines.showcase import RATE_SPAN_US, WINDOW_US, around, choose, detections
@@ -76,8 +75,7 @@ def publish(
     anchors = anchor_table(found.scores.anchors, f"eqs_{found.headline.name}")
     write_table(anchors, folder / "anchors.csv")
     protocol = instantiate(cfg.protocol)
-    generator = data.generator if isinstance(data, DSECFolder) else None
-    sensor = generator.sensor_hash if generator is not None else None
+    sensor = data.sensor_hash
     cards = {"mAP protocol": protocol.card()} if found.runs else {}
     write_report(
         folder,

@@ -9,8 +9,8 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from eqs.content import content_hash
+from eqs.data import Dataset
 from eqs.files import short_hash
-from eqs.pipelines.build import Dataset
 
 VERSION = 1  # raised whenever equal settings begin to train other detectors
 
@@ -20,7 +20,7 @@ PARTS = ("data", "protocol", "model", "recipe", "datamodule", "task", "trainer",
 # `data_hash`), on what and by how many processes it is computed, and what is shown of it. Neither
 # do `jobs`, `compile`, `logger` and `paths`. Results differ between devices by rounding alone.
 INCIDENTAL = {
-    "data": {"root", "generator", "workers"},
+    "data": {"root", "generator", "workers", "scored", "first_frames", "event_view"},
     "datamodule": {"seed", "num_workers", "histogram_cache", "evaluation_length"},
     "trainer": {
         "accelerator", "devices", "num_nodes", "strategy", "plugins", "logger", "callbacks",
@@ -69,8 +69,8 @@ def data_hash(data: Dataset) -> str:
     """Hash of what every recording holds, frames, times, labels and events, split by split."""
     return short_hash(
         {
-            split: [data.load(folder).content_hash() for folder in folders]
-            for split, folders in data.folders().items()
+            split: [data.load(places).content_hash() for places in sequences]
+            for split, sequences in data.sequences().items()
         }
     )
 

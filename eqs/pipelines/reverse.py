@@ -10,8 +10,7 @@ from collections.abc import Mapping
 
 from hydra.utils import instantiate
 
-from eqs.data import EventSource, RecordedEvents
-from eqs.pipelines.build import Dataset
+from eqs.data import Dataset, EventSource, RecordedEvents
 from eqs.pipelines.runs import Run
 from eqs.pipelines.train import build_task
 
@@ -24,8 +23,10 @@ def reverse_precision(
     Args:
         run: a detector trained on real events.
         data: its data set.
-        systems: simulated events, which must exist already.
+        systems: simulated events, made where they are missing.
     """
+    for source in systems.values():
+        source.prepare(data.recordings("test"))
     config = run.config()
     protocol = instantiate(config.protocol)
     task = build_task(config, protocol, list(systems))

@@ -38,7 +38,7 @@ def sanity(cfg: DictConfig, results: Path, console: Console) -> None:
     require_judge(cfg)  # before a data set is generated
     data = dataset(cfg)
     scoring = find_scoring(cfg, data)
-    everything = data.recordings("test")
+    everything = data.scored_recordings()
     recordings = everything[: cfg.sanity_recordings]
     rest = everything[len(recordings) :]
     rows: list[dict[str, Any]] = []

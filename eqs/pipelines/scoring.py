@@ -10,11 +10,11 @@ from typing import Any
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
+from eqs.data import Dataset
 from eqs.events import EventReader
 from eqs.metrics import EventQualityScore, Judge, Reading, StreamScore
 from eqs.metrics.definition import choices
 from eqs.metrics.scoring import Watcher
-from eqs.pipelines.build import Dataset
 from eqs.pipelines.judge import centred, find_judge, scoring_device, training_content
 
 log = logging.getLogger(__name__)

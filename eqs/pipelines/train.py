@@ -15,9 +15,9 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
 
-from eqs.data import EventSource, LabelProtocol, RecordedEvents
+from eqs.data import Dataset, EventSource, LabelProtocol, RecordedEvents
 from eqs.files import one_at_a_time, short_hash
-from eqs.pipelines.build import Dataset, event_source
+from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import write_judge
 from eqs.pipelines.prepare import prepare_data, prepare_stream

@@ -84,7 +84,9 @@ def test_nothing_is_simulated_where_frames_are_missing(
     tmp_path: Path, recording: Recording
 ) -> None:
     blind = replace(recording, name="blind", frame_paths=())
-    with pytest.raises(ValueError, match=r"simulate from in .*distorted, got none; set data\.root"):
+    with pytest.raises(
+        ValueError, match=r"frames of blind to simulate from, got none; set data\.root"
+    ):
         source(tmp_path).prepare([recording, blind])
     assert not (tmp_path / "simulated").exists()
 
