@@ -40,6 +40,11 @@ class Dataset(ABC):
         """What identifies the event camera of a rendered data set; None where it is a real one."""
         return None
 
+    @property
+    def classes(self) -> Mapping[str, Sequence[int]] | None:
+        """The numbers that labels give each class; None where nobody says so."""
+        return None
+
     @abstractmethod
     def recordings(self, split: str) -> list[Recording]:
         """The recordings of one split.

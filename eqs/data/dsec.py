@@ -1,4 +1,4 @@
-"""Data sets of recordings in the layout of DSEC, with or without labels."""
+"""DSEC, and every other labelled data set in its layout."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Protocol
 
 from eqs.data.dataset import Dataset
 from eqs.data.event_view import EventView
-from eqs.data.places import EVENTS, FRAMES, Places, find_sequences
+from eqs.data.places import Places, find_sequences
 from eqs.data.recording import Recording, frames_in
 
 log = logging.getLogger(__name__)
@@ -105,9 +105,11 @@ class DSECFolder(Dataset):
             self.generator.generate(root)
         found = self._found()
         for split, patterns in self._named().items():
-            for pattern in patterns:
-                if not any(fnmatchcase(name, pattern) for name in found):
-                    log.warning("%s has no sequence %s of the %s split", root, pattern, split)
+            missing = [p for p in patterns if not any(fnmatchcase(name, p) for name in found)]
+            if missing:
+                log.warning(
+                    "%s has no sequence %s of the %s split", root, ", ".join(missing), split
+                )
 
     def make_frames(self) -> None:
         """Bring rectified frames of all splits into the event camera's view, where none are."""
@@ -176,77 +178,6 @@ class DSECFolder(Dataset):
         return self.event_view.places(places)
 
 
-@dataclass(frozen=True, kw_only=True)
-class RecordingFolder(Dataset):
-    """Recordings without labels: enough to score simulators, too little to train.
-
-    The size of each sensor is that of its frames. Recordings without frames cannot be simulated
-    and are left out; `skipped` names them.
-
-    Args:
-        name: name of the data set, used for the folders of what is derived from it.
-        root: folder whose subfolders are recordings.
-        crop_rows: number of rows, counted from the top, that are used; all of them if None.
-    """
-
-    name: str
-    root: Path | str
-    crop_rows: int | None = None
-
-    @property
-    def split_names(self) -> Sequence[str]:
-        """Test data only."""
-        return ("test",)
-
-    def prepare(self) -> None:
-        """Check that there is something to score, and say what is left out.
-
-        Raises:
-            FileNotFoundError: there is no such folder.
-            ValueError: no recording below it has both frames and events.
-        """
-        self.recordings()
-        for name, reason in self.skipped.items():
-            log.warning("skipped %s: %s", name, reason)
-
-    @property
-    def skipped(self) -> dict[str, str]:
-        """Name of each recording that is left out, and why."""
-        return {
-            name: reason
-            for name, places in find_sequences(Path(self.root)).items()
-            if (reason := _reason_to_skip(places))
-        }
-
-    def recordings(self, split: str = "test") -> list[Recording]:
-        """All recordings with frames and events; they are test data only.
-
-        Raises:
-            ValueError: another split was asked for, or there is no such recording.
-        """
-        if split != "test":
-            raise ValueError(
-                f"Expected the test split of the unlabelled recordings in {self.root}, got "
-                f"{split!r}; set data to a labelled data set to train"
-            )
-        found, skipped = find_sequences(Path(self.root)), self.skipped
-        if len(skipped) == len(found):
-            reasons = "; ".join(f"{name} {reason}" for name, reason in skipped.items())
-            raise ValueError(
-                f"Expected recordings with frames and events in {self.root}, got none ({reasons}); "
-                "set data.root"
-            )
-        return [self.load(places) for name, places in found.items() if name not in skipped]
-
-    def sequences(self) -> dict[str, list[Places]]:
-        """Where all recordings lie, those that are left out among them."""
-        return {"test": list(find_sequences(Path(self.root)).values())}
-
-    def load(self, sequence: Places) -> Recording:
-        """The recording of a sequence, of its own size."""
-        return Recording.at(sequence)
-
-
 def parse_size(size: str) -> tuple[int, int]:
     """Height and width from text like 640x480 (width first, as sizes are spoken).
 
@@ -261,9 +192,3 @@ def parse_size(size: str) -> tuple[int, int]:
     if len(parts) != 2 or not all(part.isdecimal() and int(part) for part in parts):
         raise ValueError(f"Expected a size like 640x480, got {size!r}; set data.size")
     return int(parts[1]), int(parts[0])
-
-
-def _reason_to_skip(places: Places) -> str | None:
-    if not frames_in(places.frames):
-        return f"has no frames in {FRAMES}"
-    return None if places.events.exists() else f"has no events in {EVENTS}"

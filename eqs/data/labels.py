@@ -87,6 +87,22 @@ class LabelProtocol:
                 f"{self.min_diagonal_px}; set protocol.min_side_px and protocol.min_diagonal_px"
             )
 
+    def require_known(self, classes: Mapping[str, Sequence[int]] | None) -> None:
+        """See that the classes are those of the data set, where it names its own.
+
+        Raises:
+            ValueError: one of the numbers that count is no class of the data set.
+        """
+        if not classes:
+            return
+        known = {int(number) for numbers in classes.values() for number in numbers}
+        if not known.issuperset(self._label_of):
+            named = {name: [*numbers] for name, numbers in classes.items()}
+            raise ValueError(
+                f"Expected a protocol of the data set's classes {named}, got {self.name} with "
+                f"{ {name: [*each] for name, each in self.classes.items()} }; set protocol=own"
+            )
+
     def match(
         self, tracks: NDArray[Any] | None, frame_times_us: NDArray[np.int64]
     ) -> MatchedLabels:

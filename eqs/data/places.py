@@ -8,7 +8,7 @@ sequences, whose archives hold bare files and carry the sequence's name (`SEQUEN
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from eqs.frames.order import natural_key
@@ -31,6 +31,13 @@ PARTS = {
     "calibration": (CALIBRATION, Path("calibration/cam_to_cam.yaml")),
 }
 SIGNS = {place.parts[0] for places in PARTS.values() for place in places}
+# What a recording of another camera's program looks like: one event file, and frames beside it.
+EVENT_SUFFIXES = (
+    ".raw", ".dat", ".aedat", ".aedat4", ".es", ".bag", ".db3", ".mcap", ".h5", ".hdf5", ".npz",
+    ".npy", ".bin", ".csv", ".mat",
+)  # fmt: skip
+LOOSE_FRAMES = ("frames", "images")
+LOOSE_TIMES = ("timestamps.txt", "frames/timestamps.txt", "images/timestamps.txt")
 DEEPEST = 3  # folders between the root and a part's sequence
 UNFINISHED = ".partial"
 
@@ -94,6 +101,47 @@ def find_sequences(root: Path) -> dict[str, Places]:
     if not found:
         raise ValueError(_none_found(root))
     return {name: _places(homes[name], name, found[name]) for name in sorted(found, key=_order)}
+
+
+def find_recordings(root: Path) -> dict[str, Places]:
+    """The sequences below a root, and folders that hold one event file of any kind.
+
+    Frames of the latter are images in `frames` or `images`, their times lie in `timestamps.txt`.
+
+    Raises:
+        FileNotFoundError: there is no such folder.
+        ValueError: there is neither, or a folder holds several event files.
+    """
+    loose = [path for path in root.iterdir() if path.is_dir()] if root.is_dir() else []
+    found = {places.name: places for folder in loose if (places := _loose(folder)) is not None}
+    try:
+        found = {**find_sequences(root), **found}
+    except ValueError:
+        if not found:
+            raise
+    return {name: found[name] for name in sorted(found, key=_order)}
+
+
+def _loose(folder: Path) -> Places | None:
+    files = [path for path in folder.iterdir() if path.suffix.lower() in EVENT_SUFFIXES]
+    if not files or folder.name.startswith(".") or folder.name.endswith(UNFINISHED):
+        return None
+    if len(files) > 1:
+        raise ValueError(
+            f"Expected one event file in {folder}, got {', '.join(sorted(f.name for f in files))}; "
+            "keep one"
+        )
+    places = Places.inside(folder)
+    if places.events.exists() or (folder / "events_left").exists():
+        return None
+    frames = (folder / name for name in LOOSE_FRAMES)
+    times = (folder / name for name in LOOSE_TIMES)
+    return replace(
+        places,
+        events=files[0],
+        frames=next((path for path in frames if path.is_dir()), places.frames),
+        frame_times=next((path for path in times if path.is_file()), places.frame_times),
+    )
 
 
 def _order(name: str) -> tuple[object, str]:

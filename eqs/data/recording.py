@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.content import content_hash, content_hashes
+from eqs.data.label_files import label_array
 from eqs.data.places import CALIBRATION, EVENTS, FRAME_TIMES, FRAMES, Places
 from eqs.files import short_hash, whole_numbers
 from eqs.frames import (
@@ -20,8 +21,6 @@ from eqs.frames import (
     image_size,
     read_image,
 )
-
-TRACK_FIELDS = ("t", "x", "y", "w", "h", "class_id")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,9 +87,9 @@ class Recording:
                 f"Expected {EVENTS} or images in {FRAMES} in {folder}, found neither; "
                 "set data.root to a folder of recordings in the layout of DSEC"
             )
-        times_us = _frame_times(places.frame_times, len(paths))
+        times_us = frame_times(places.frame_times, len(paths))
         if paths:
-            height, width = _frame_size(paths[0], height, width)
+            height, width = frame_size(paths[0], height, width)
         if height is None or width is None:
             raise ValueError(
                 f"Expected a sensor size for {folder}, which has no frames to tell it; "
@@ -209,7 +208,12 @@ def _rectified_alone(places: Places) -> str:
     )
 
 
-def _frame_times(path: Path, frames: int) -> NDArray[np.int64]:
+def frame_times(path: Path, frames: int) -> NDArray[np.int64]:
+    """The times in a file, int64 microseconds; none without a file and without frames.
+
+    Raises:
+        ValueError: the file is missing, does not fit so many frames, or its times do not rise.
+    """
     if not path.exists():
         if frames:
             raise ValueError(
@@ -251,7 +255,12 @@ def _exposures(path: Path, frames: int) -> NDArray[np.int64] | None:
     return exposures_us
 
 
-def _frame_size(path: Path, height: int | None, width: int | None) -> tuple[int, int]:
+def frame_size(path: Path, height: int | None, width: int | None) -> tuple[int, int]:
+    """Height and width of a frame.
+
+    Raises:
+        ValueError: it is no image, or of another size than given.
+    """
     found_height, found_width = image_size(path)
     if (height or found_height, width or found_width) != (found_height, found_width):
         raise ValueError(
@@ -262,23 +271,7 @@ def _frame_size(path: Path, height: int | None, width: int | None) -> tuple[int,
 
 
 def _tracks(path: Path, frame_times_us: NDArray[np.int64]) -> NDArray[np.void]:
-    try:
-        tracks: NDArray[np.void] = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise ValueError(
-            f"Expected a label array in {path}, got: {error}; replace the damaged file"
-        ) from error
-    missing = [name for name in TRACK_FIELDS if name not in (tracks.dtype.names or ())]
-    if missing:
-        raise ValueError(
-            f"Expected labels with the fields {', '.join(TRACK_FIELDS)} in {path}, got none named "
-            f"{', '.join(missing)}; replace the file"
-        )
-    if tracks.ndim != 1 or not all(np.isfinite(tracks[name]).all() for name in TRACK_FIELDS):
-        raise ValueError(
-            f"Expected a row of labels with finite numbers in {path}, got shape {tracks.shape} "
-            "or NaN; replace the file"
-        )
+    tracks = label_array(path)
     if len(tracks) and not len(frame_times_us):
         raise ValueError(
             f"Expected the times of the frames of the labels in {path}, found none; add "

@@ -157,6 +157,7 @@ def check(cfg: DictConfig) -> None:
     """
     data: Dataset = instantiate(cfg.data)
     protocol: LabelProtocol = instantiate(cfg.protocol)
+    protocol.require_known(data.classes)
     look = Inspection(data=data, protocol=protocol, window_us=cfg.window_us, thorough=cfg.thorough)
     places = [(split, each) for split, held in data.sequences().items() for each in held]
     workers = min(available_cores(), len(places)) or 1

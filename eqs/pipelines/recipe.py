@@ -20,7 +20,10 @@ PARTS = ("data", "protocol", "model", "recipe", "datamodule", "task", "trainer",
 # `data_hash`), on what and by how many processes it is computed, and what is shown of it. Neither
 # do `jobs`, `compile`, `logger` and `paths`. Results differ between devices by rounding alone.
 INCIDENTAL = {
-    "data": {"root", "generator", "workers", "scored", "first_frames", "event_view"},
+    "data": {
+        "root", "generator", "workers", "scored", "first_frames", "event_view", "converted",
+        "tables",
+    },
     "datamodule": {"seed", "num_workers", "histogram_cache", "evaluation_length"},
     "trainer": {
         "accelerator", "devices", "num_nodes", "strategy", "plugins", "logger", "callbacks",

@@ -50,6 +50,7 @@ def train(cfg: DictConfig) -> RunResult | None:
     recipe(cfg)
     times = phase_times(cfg)
     data = prepare_data(cfg, times)
+    protocol.require_known(data.classes)
     job = Job.of(cfg, source, data, protocol)
     if not first:  # a process that the first one started, which holds the lock and reports
         execute(job, times)

@@ -97,7 +97,7 @@ def test_recordings_without_frames_are_named(tmp_path, make_recording, caplog):
         path.unlink()
     silent = make_recording(tmp_path / "silent", tracks=None)
     (silent / "events/left/events.h5").unlink()
-    data = RecordingFolder(name="recordings", root=tmp_path)
+    data = RecordingFolder(name="recordings", root=tmp_path, converted=tmp_path / ".converted")
     data.prepare()
     assert data.skipped == {
         "bare": "has no frames in images/left/distorted",
@@ -114,7 +114,9 @@ def test_recordings_all_without_frames(tmp_path, make_recording):
     for path in (bare / "images/left/distorted").iterdir():
         path.unlink()
     with pytest.raises(ValueError, match=r"got none \(bare has no frames"):
-        RecordingFolder(name="recordings", root=tmp_path).prepare()
+        RecordingFolder(
+            name="recordings", root=tmp_path, converted=tmp_path / ".converted"
+        ).prepare()
 
 
 def test_official_splits():
@@ -157,6 +159,6 @@ def test_recordings_with_frames_of_another_suffix_are_not_skipped(tmp_path, make
     path = make_recording(tmp_path / "whole", tracks=None)
     for frame in (path / "images/left/distorted").iterdir():
         frame.rename(frame.with_suffix(".BMP"))
-    data = RecordingFolder(name="recordings", root=tmp_path)
+    data = RecordingFolder(name="recordings", root=tmp_path, converted=tmp_path / ".converted")
     assert data.skipped == {}
     assert len(data.all_recordings()[0].frame_paths) == 6

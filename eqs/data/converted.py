@@ -1,0 +1,52 @@
+"""Event files of any kind, brought into the layout of DSEC once."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from eqs.content import content_hash
+from eqs.events.formats import decode, is_dsec
+from eqs.files import one_at_a_time, short_hash
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tables:
+    """What tables of numbers do not say of themselves.
+
+    Args:
+        order: order of the columns, for instance `txyp`.
+        time_unit: unit of whole-numbered times: s, ms, us or ns.
+    """
+
+    order: str | None = None
+    time_unit: str | None = None
+
+
+def converted(
+    path: Path, folder: Path | str, height: int, width: int, tables: Tables | None = None
+) -> Path:
+    """The file itself where it is in the layout of DSEC, else a copy that is, made if need be.
+
+    Args:
+        path: an event file of any kind.
+        folder: where copies are kept, by what the files hold.
+        height: rows of the sensor.
+        width: columns of the sensor.
+        tables: how to read tables of numbers.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file cannot be read, or is of another sensor.
+    """
+    if is_dsec(path):
+        return path
+    tables = tables or Tables()
+    read_as = short_hash([height, width, asdict(tables)])
+    kept = Path(folder) / f"{path.stem}-{content_hash(path)}-{read_as}.h5"
+    if not kept.exists():
+        with one_at_a_time(kept, f"converting {path}"):
+            if not kept.exists():  # another process was at it
+                found = decode(path, tables.order, tables.time_unit)
+                found.events(height, width).save(kept)
+    return kept
