@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import h5py
 import hdf5plugin
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from eqs.clock import backwards
 from eqs.events.reader import STORED_TYPES
@@ -20,14 +22,19 @@ from eqs.files import complete_file
 # Windows of some ten thousand events read fastest from chunks of this length: larger chunks are
 # decompressed in vain, smaller ones cost a call each.
 CHUNK_EVENTS = 32768
-LONGEST_US = int(np.iinfo(np.uint32).max)
+COPIED_AT_ONCE = 64 * CHUNK_EVENTS
+NARROW_US = int(np.iinfo(np.uint32).max)  # what the times of DSEC can count: 71 minutes
+LONGEST_US = 24 * 3600 * 1_000_000  # the index has an entry for every millisecond
+
+log = logging.getLogger(__name__)
 
 
 class EventWriter:
     """Writes one event file, piece by piece; it gets its name only when it is complete.
 
     Until then it has a temporary name, and an exception inside the `with` block removes it.
-    The same events give the same file however they are cut into pieces.
+    The same events give the same file however they are cut into pieces. Times beyond 71 minutes
+    take 64 bits, which is said, since programs that go by DSEC's 32 do not read them.
 
     Args:
         path: where the file will be; its folder is made if need be.
@@ -69,6 +76,7 @@ class EventWriter:
         self._index = [np.zeros(1, np.int64)]  # entries of ms_to_idx; the first is 0 by definition
         self._last_us = -1
         self._count = self._next_ms = 0
+        self._columns: dict[str, h5py.Dataset] = {}
         self._pending: list[Events] = []
         self._pending_count = 0
 
@@ -78,16 +86,19 @@ class EventWriter:
         self._file = h5py.File(self._naming.__enter__(), "w")
         self._file.attrs.update(height=self.height, width=self.width)
         for name, dtype in STORED_TYPES.items():
-            self._file.create_dataset(
-                f"events/{name}",
-                shape=(0,),
-                maxshape=(None,),
-                chunks=(CHUNK_EVENTS,),
-                dtype=dtype,
-                **hdf5plugin.Blosc(cname="zstd", clevel=1, shuffle=hdf5plugin.Blosc.SHUFFLE),
-            )
+            self._columns[name] = self._create(name, dtype)
         self._next_ms = 1
         return self
+
+    def _create(self, name: str, dtype: DTypeLike) -> h5py.Dataset:
+        return self._file.create_dataset(
+            f"events/{name}",
+            shape=(0,),
+            maxshape=(None,),
+            chunks=(CHUNK_EVENTS,),
+            dtype=dtype,
+            **hdf5plugin.Blosc(cname="zstd", clevel=1, shuffle=hdf5plugin.Blosc.SHUFFLE),
+        )
 
     def __exit__(
         self,
@@ -104,7 +115,7 @@ class EventWriter:
                 self._complete()
 
     def _complete(self) -> None:
-        self._flush()
+        self._flush(self._pending_count)
         index = np.concatenate(self._index).astype(np.uint64)
         self._file.create_dataset("ms_to_idx", data=index)
         self._file.create_dataset("t_offset", data=np.int64(self._offset_us or 0))
@@ -116,7 +127,7 @@ class EventWriter:
 
         Raises:
             ValueError: the sensor differs, time runs backwards or is negative, or the recording
-                grows longer than the layout's 32-bit times can count (71 minutes).
+                grows longer than a day.
         """
         self._check(events)
         if len(events) == 0:
@@ -127,7 +138,7 @@ class EventWriter:
         self._pending.append(events)
         self._pending_count += len(events)
         if self._pending_count >= CHUNK_EVENTS:
-            self._flush()
+            self._flush(self._pending_count // CHUNK_EVENTS * CHUNK_EVENTS)
 
     def _check(self, events: Events) -> None:
         if (events.height, events.width) != (self.height, self.width):
@@ -157,21 +168,59 @@ class EventWriter:
                 f"{last - offset} us; split it"
             )
 
-    def _flush(self) -> None:
-        if not self._pending:
+    def _flush(self, count: int) -> None:
+        """Write so many of the pending events, a chunk of the file at a time."""
+        if not count:
             return
-        part = Events.concatenate(self._pending)
-        relative = part.t - np.int64(self._offset_us or 0)
-        self._extend_index(relative)
-        stop = self._count + len(part)
-        for name in STORED_TYPES:
-            values = relative.astype(np.uint32) if name == "t" else getattr(part, name)
-            self._file[f"events/{name}"].resize((stop,))
-            self._file[f"events/{name}"][self._count : stop] = values
-        self._count, self._pending, self._pending_count = stop, [], 0
+        pending = Events.concatenate(self._pending)
+        columns = {name: getattr(pending, name)[:count] for name in STORED_TYPES}
+        columns["t"] = columns["t"] - np.int64(self._offset_us or 0)
+        self._extend_index(columns["t"])
+        # Chunk after chunk of all columns, so that the file does not tell where pieces ended.
+        for first in range(0, count, CHUNK_EVENTS):
+            self._write(
+                {name: each[first : first + CHUNK_EVENTS] for name, each in columns.items()}
+            )
+        self._pending, self._pending_count = [pending[count:]], len(pending) - count
+
+    def _write(self, part: Mapping[str, NDArray[Any]]) -> None:
+        """Write a chunk of the file, or its last piece."""
+        if part["t"][-1] > NARROW_US:
+            self._widen()
+        for name, values in part.items():
+            extend(self._columns[name], values)
+        self._count += len(part["t"])
+
+    def _widen(self) -> None:
+        """Go on with times of 64 bits."""
+        narrow = self._columns["t"]
+        if narrow.dtype == np.uint64:
+            return
+        log.warning(
+            "%s is longer than 71 minutes: its times take 64 bits, which programs that go by "
+            "DSEC's 32 do not read",
+            self.path,
+        )
+        self._file.move("events/t", "narrow")
+        wide = self._create("t", np.uint64)
+        wide.resize((self._count,))
+        for first in range(0, self._count, COPIED_AT_ONCE):
+            last = min(first + COPIED_AT_ONCE, self._count)
+            wide[first:last] = narrow[first:last].astype(np.uint64)
+        del self._file["narrow"]
+        self._columns["t"] = wide
 
     def _extend_index(self, relative_us: NDArray[np.int64]) -> None:
         stop_ms = int(relative_us[-1]) // 1000 + 1
         edges_us = np.arange(self._next_ms, stop_ms, dtype=np.int64) * 1000
         self._index.append(self._count + np.searchsorted(relative_us, edges_us, side="left"))
         self._next_ms = max(self._next_ms, stop_ms)
+
+
+def extend(column: h5py.Dataset, values: NDArray[Any]) -> None:
+    """Write values behind those of a column, without the high-level interface's cost per call."""
+    count, values = len(column), np.ascontiguousarray(values, column.dtype)
+    column.id.set_extent((count + len(values),))
+    space = column.id.get_space()
+    space.select_hyperslab((count,), (len(values),))
+    column.id.write(h5py.h5s.create_simple((len(values),)), space, values)

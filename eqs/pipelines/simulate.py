@@ -128,7 +128,7 @@ def check_times(clip: FrameFolder | VideoFile) -> None:
         )
     if clip.duration_us > LONGEST_US:
         raise ValueError(
-            f"Expected a clip of at most {LONGEST_US} us, which 32-bit times can count, got "
+            f"Expected a clip of at most a day, {LONGEST_US} us, got "
             f"{clip.duration_us} us; set frames to a part of it"
         )
 
