@@ -20,7 +20,7 @@ def build_detector(cfg: DictConfig) -> nn.Module:
     Raises:
         ValueError: there is no such class, it does not take these settings, or it is no detector.
     """
-    model = built(_plain(cfg.model))
+    model = built(plain(cfg.model))
     require_detector(model)
     if cfg.compile:
         compile_stages = getattr(model, "compile_stages", None)
@@ -35,7 +35,7 @@ def build_detector(cfg: DictConfig) -> nn.Module:
 
 def settings_of(cfg: DictConfig) -> dict[str, Any]:
     """What builds the configured detector again; its weights come from elsewhere then."""
-    settings = _plain(cfg.model)
+    settings = plain(cfg.model)
     return {**settings, "weights": None} if "weights" in settings else settings
 
 
@@ -56,5 +56,6 @@ def trained_detector(run: Run) -> nn.Module:
     return model.eval()
 
 
-def _plain(node: DictConfig) -> dict[str, Any]:
+def plain(node: DictConfig) -> dict[str, Any]:
+    """A part of a configuration as plain values, with every interpolation resolved."""
     return cast(dict[str, Any], OmegaConf.to_container(node, resolve=True))
