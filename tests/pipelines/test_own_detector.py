@@ -13,17 +13,30 @@ from lightning.pytorch.callbacks import Callback
 from omegaconf import DictConfig, open_dict
 
 import eqs
+from eqs.metrics import weights_sha256
 from eqs.models import Geometry, load_detector
 from eqs.pipelines.build import dataset
 from eqs.pipelines.detections import detections_over
 from eqs.pipelines.evaluate import evaluate
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.pipelines.runs import Run, finished_runs
+from eqs.pipelines.scoring import find_scoring
 from eqs.pipelines.train import build_task, train
 
 CONFIGS = Path(eqs.__file__).parent / "configs"
 PAGE = Path(__file__).parents[2] / "docs" / "detector.md"
 STEPS = 40
+WITH_TAPS = """
+from my_detector import CellDetector
+
+
+class Shown(CellDetector):
+    in_channels, strides, tap_names = 20, (8,), ("memory",)
+
+    def taps(self, x, states, *, stages, names):
+        maps, states = self.forward_sequence(x, states)
+        return {name: maps for name in names}, states
+"""
 
 
 class Interrupted(Exception):
@@ -50,6 +63,7 @@ def written(place: Path):
     (code,) = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
     (settings,) = re.findall(r"```yaml\n(.*?)```", section, re.DOTALL)
     (place / "my_detector.py").write_text(code)
+    (place / "my_taps.py").write_text(WITH_TAPS)
     (place / "my_configs" / "model").mkdir(parents=True)
     (place / "my_configs" / "model" / "cells.yaml").write_text(settings)
     with pytest.MonkeyPatch.context() as patch:
@@ -152,6 +166,7 @@ def test_without_taps_it_is_no_judge(
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*LeafSpec.*:FutureWarning")
 @pytest.mark.parametrize("recurrent", [True, False])
 def test_its_checkpoint_is_the_detector_that_was_tested(
     place: Path, trained: dict[bool, Run], recurrent: bool
@@ -174,6 +189,30 @@ def test_its_checkpoint_is_the_detector_that_was_tested(
     for window, frame in zip(windows, expected, strict=True):
         predictions, states = detector(window, states)
         torch.testing.assert_close(predictions[0], frame, rtol=1e-4, atol=1e-4)
+    (window,) = windows[:1]
+    program = torch.export.export(detector, (window, detector.start()))
+    for found, wanted in zip(
+        program.module()(window, detector.start()), detector(window, detector.start()), strict=True
+    ):
+        torch.testing.assert_close(found, wanted, rtol=0, atol=1e-5)
     recording = dataset(cfg).recordings("test")[0]
     found = list(detections_over(run, recording, recording.events_path, protocol))
     assert sum(len(boxes.labels) for boxes in found) > 0
+
+
+@pytest.mark.slow
+def test_with_taps_it_is_the_judge_of_its_world(place: Path) -> None:
+    there = [f"paths.runs={place / 'shown'}", "model._target_=my_taps.Shown"]
+    train(configured(place, "sim=real", "recipe.steps_per_epoch=2", *there))
+    (run,) = finished_runs(place / "shown/dsec_mini_smoke")
+    cfg = configured(place, f"paths.runs={place / 'shown'}", name="evaluate")
+    found = find_scoring(cfg, dataset(cfg))
+    assert [reading.name for reading in found.readings] == ["memory_centred", "memory_raw"]
+    assert found.judge.description.startswith("Shown trained on the recorded events of dsec_mini")
+    weights = load_detector(run.weights).model
+    assert found.judge.weights_sha256 == weights_sha256(weights)
+    assert found.judge.untrained().weights_sha256 != found.judge.weights_sha256
+    (run.folder / "judge.json").unlink()
+    again = find_scoring(cfg, dataset(cfg)).headline
+    assert again.definition == found.headline.definition
+    assert again.centre.sha256 == found.headline.centre.sha256
