@@ -216,3 +216,21 @@ def test_with_taps_it_is_the_judge_of_its_world(place: Path) -> None:
     again = find_scoring(cfg, dataset(cfg)).headline
     assert again.definition == found.headline.definition
     assert again.centre.sha256 == found.headline.centre.sha256
+
+
+@pytest.mark.parametrize(
+    ("override", "sentence"),
+    [
+        ("compile=true", "detector with compile_stages, got a CellDetector without; set compile"),
+        ("model._target_=my_detector.Gone", "class that can be imported as my_detector.Gone"),
+        ("model._target_=torch.nn.Identity", "got a Identity without forward_sequence, loss"),
+        ("+model.depth=3", "settings that my_detector.CellDetector takes"),
+    ],
+)
+def test_what_is_no_detector_is_refused_before_the_work(
+    place: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture, override: str, sentence: str
+) -> None:
+    with pytest.raises(SystemExit):
+        train(configured(place, "sim=real", f"paths.datasets={tmp_path}", override))
+    assert sentence in caplog.messages[-1]
+    assert list(tmp_path.iterdir()) == []
