@@ -9,7 +9,7 @@ from typing import Literal, get_args, get_origin, get_type_hints
 
 from eqs.files import short_hash
 
-# The activations of a stage that can be compared.
+# The activations of a stage that can be compared, in networks that do not name their own.
 ACTIVATIONS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 
 # Choices on which the pooled features do not depend: a centre serves whatever these say.
@@ -42,7 +42,7 @@ class Definition:
 
     Args:
         tap: which activation of each stage is compared: gate (the paper's formula), gate_logits,
-            hidden, cell, attention or downsample.
+            hidden, cell, attention or downsample; of another network than RVT a name of its own.
         features: compared as they are, `raw`; `centred`, minus the mean real feature; or also
             `whitened`, so that real features vary alike in every direction.
         stages: stages of the backbone, counted from 1.
@@ -86,8 +86,6 @@ class Definition:
 
     def __post_init__(self) -> None:
         """Reject what no score can be computed from."""
-        if self.tap not in ACTIVATIONS:
-            raise ValueError(f"Expected a tap among {ACTIVATIONS}, got {self.tap!r}; set eqs.tap")
         if any(not isinstance(stage, int) for stage in self.stages):
             raise ValueError(
                 f"Expected stages as whole numbers, got {self.stages}; set eqs.stages=[1,2,3]"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
 import torch
 from torch import Tensor, nn
 
-from eqs.metrics.definition import Definition
+from eqs.metrics.definition import ACTIVATIONS, Definition
 from eqs.metrics.pooling import pool_grid, pool_patches, smooth_grid, smooth_patches
 from eqs.metrics.windows import normalised_counts
 
@@ -31,6 +31,12 @@ BackboneState = Any
 class TappedBackbone(Protocol):
     """A network that shows its inner maps.
 
+    Beside `taps` a network of your own has three attributes: `in_channels`, twice its time bins;
+    `strides`, the pixels per cell of each stage; and `tap_names`, its activations, the one to
+    compare first. Without them it is taken to be an RVT in this respect.
+
+    Convention: inputs have the size of the sensor, and a network pads as it needs, right and below.
+
     Args:
         x: histograms, float, shape (windows, streams, channels, height, width).
         states: recurrent state after the previous window, None at the start.
@@ -46,6 +52,55 @@ class TappedBackbone(Protocol):
         self, x: Tensor, states: BackboneState, *, stages: Sequence[int], names: Sequence[str]
     ) -> tuple[dict[str, list[Tensor]], BackboneState]:
         """Maps by name and stage, and the state after the last window."""
+
+
+NAMED = ("taps", "tap_names", "strides", "in_channels")
+
+
+def require_network(network: object) -> None:
+    """See that a network of somebody's own can judge.
+
+    Raises:
+        ValueError: it lacks something.
+    """
+    missing = [name for name in NAMED if not hasattr(network, name)]
+    if missing:
+        raise ValueError(
+            f"Expected a network with {', '.join(NAMED)}, got a {type(network).__name__} without "
+            f"{', '.join(missing)}; set eqs.judge"
+        )
+
+
+def tap_names(backbone: object) -> tuple[str, ...]:
+    """The activations that a network shows: its own `tap_names`, else those of RVT."""
+    return tuple(getattr(backbone, "tap_names", ACTIVATIONS))
+
+
+def require_taps(backbone: object, taps: Sequence[str]) -> None:
+    """Refuse activations that a network does not show.
+
+    Raises:
+        ValueError: one of them is unknown.
+    """
+    known = tap_names(backbone)
+    unknown = [tap for tap in taps if tap not in known]
+    if unknown:
+        raise ValueError(
+            f"Expected a tap among {', '.join(known)}, got {', '.join(unknown)}; set eqs.tap"
+        )
+
+
+def choices_for(backbone: object) -> dict[str, Any]:
+    """What a definition says of a network where nobody chooses: a tap, stages and bins it has."""
+    names, strides = tap_names(backbone), getattr(backbone, "strides", RVT_STRIDES)
+    chosen: dict[str, Any] = {}
+    if Definition.tap not in names:
+        chosen["tap"] = names[0]
+    if len(strides) < len(Definition.stages):
+        chosen["stages"] = tuple(range(1, len(strides) + 1))
+    if hasattr(backbone, "in_channels"):
+        chosen["bins"] = backbone.in_channels // 2
+    return chosen
 
 
 def strides_of(backbone: object, stages: Sequence[int]) -> tuple[int, ...]:
@@ -86,8 +141,9 @@ def pooled_features(
         with one channel.
 
     Raises:
-        ValueError: the backbone has fewer stages.
+        ValueError: the backbone has fewer stages or no such tap, or its maps have other shapes.
     """
+    require_taps(backbone, taps)
     stages, side = definition.stages, definition.patch_size
     pool = POOLS[definition.patch, definition.pooling]
     strides = strides_of(backbone, stages)
@@ -101,6 +157,7 @@ def pooled_features(
             if definition.state == "reset":  # as many streams of one window each
                 x, states = x.flatten(0, 1)[None], None
             maps, states = backbone.taps(x, states, stages=stages, names=tuple(taps))
+            check_maps(maps, taps, strides, tuple(x.shape))
             pooled = {
                 name: [
                     pool(full[..., : -(-height // stride), : -(-width // stride)].float(), side)
@@ -114,6 +171,36 @@ def pooled_features(
                 total = counts.sum(dim=2, keepdim=True)
                 pooled[ACTIVE] = [pool(pool_patches(total, px), side) > 0 for px in strides]
         yield pooled
+
+
+def check_maps(
+    maps: Mapping[str, Sequence[Tensor]],
+    taps: Sequence[str],
+    strides: Sequence[int],
+    shape: tuple[int, ...],
+) -> None:
+    """Refuse maps that are not those of histograms of this shape.
+
+    Raises:
+        ValueError: one is missing, or of other windows or streams, or does not cover the image.
+    """
+    windows, streams, _, height, width = shape
+    wanted = [(windows, streams, "C", -(-height // px), -(-width // px)) for px in strides]
+    for tap in taps:
+        shapes = [tuple(each.shape) for each in maps.get(tap, ())]
+        if len(shapes) != len(wanted) or not all(map(_covers, shapes, wanted)):
+            raise ValueError(
+                f"Expected maps of the tap {tap} by stage of shapes {wanted} or, padded, with more "
+                f"rows and columns, got {shapes}; change the strides or the taps of the network"
+            )
+
+
+def _covers(shape: tuple[int, ...], wanted: tuple[Any, ...]) -> bool:
+    return (
+        len(shape) == len(wanted)
+        and shape[:2] == wanted[:2]
+        and all(there >= least for there, least in zip(shape[3:], wanted[3:], strict=True))
+    )
 
 
 @contextmanager

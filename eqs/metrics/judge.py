@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import torch
 from torch import nn
 
 from eqs.metrics.centre import Centre, feature_centres
 from eqs.metrics.definition import Definition, choices
-from eqs.metrics.features import TappedBackbone
+from eqs.metrics.features import TappedBackbone, choices_for, require_taps
 from eqs.metrics.judge_folder import RECORD, WEIGHTS, file_of, read_judge, write_judge
-from eqs.metrics.network import RVTShape, trained_backbone, untrained_backbone, weights_sha256
+from eqs.metrics.network import (
+    Network,
+    OwnNetwork,
+    RVTShape,
+    trained_backbone,
+    weights_sha256,
+)
 from eqs.metrics.reading import Reading
 from eqs.metrics.windows import StreamOrHistograms
-from eqs.models import RVTBackbone
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,7 +38,7 @@ class Judge:
         weights_sha256: hash of the network's named tensors; empty where it has none.
         centres: mean real features, one for each activation and way to pool; without any, scores
             are raw.
-        shape: what builds the network again; None for networks that are no RVT.
+        network: what builds the network again; None for one that is only in memory.
         description: what it was trained on, in a phrase.
 
     Example:
@@ -46,7 +51,7 @@ class Judge:
     definition: Definition = field(default_factory=Definition)
     weights_sha256: str = ""
     centres: tuple[Centre, ...] = ()
-    shape: RVTShape | None = None
+    network: Network | None = None
     description: str = "a network given in memory"
 
     @classmethod
@@ -58,7 +63,8 @@ class Judge:
             **chosen: choices of the headline, see `Definition`.
         """
         digest = weights_sha256(backbone) if isinstance(backbone, nn.Module) else ""
-        definition = Definition(**{"architecture": type(backbone).__name__, **chosen})
+        named = {"architecture": type(backbone).__name__, **choices_for(backbone)}
+        definition = Definition(**{**named, **chosen})
         return cls(backbone=backbone, definition=definition, weights_sha256=digest)
 
     @classmethod
@@ -69,33 +75,55 @@ class Judge:
             seed: seed of the weights.
             **shape: see `RVTShape`.
         """
-        built = RVTShape(**shape)
-        return cls._of_rvt(untrained_backbone(built, seed), built, "random weights, a control")
+        network = RVTShape(**shape)
+        return cls._of(network.untrained(seed), network, "random weights, a control")
 
     @classmethod
-    def from_checkpoint(cls, path: Path | str, partition_split_32: int | None = None) -> Self:
+    def built(cls, settings: Mapping[str, Any]) -> Self:
+        """A judge around a network of your own, without centres, whose scores are raw.
+
+        Args:
+            settings: keyword arguments of a torch module that is a `TappedBackbone`, with the
+                dotted name of its class as `_target_`. It loads its own weights; what it draws is
+                always the same.
+
+        Raises:
+            ValueError: there is no such class, it does not take these, or it cannot judge.
+        """
+        network = OwnNetwork(settings=settings)
+        return cls._of(network.build(), network, f"a network {network.architecture}")
+
+    @classmethod
+    def from_checkpoint(
+        cls,
+        path: Path | str,
+        partition_split_32: int | None = None,
+        settings: Mapping[str, Any] | None = None,
+    ) -> Self:
         """A judge without centres from a detector's checkpoint, whose scores are raw.
 
         Args:
-            path: checkpoint of an RVT detector trained on real events.
-            partition_split_32: as it was trained; None for what the checkpoint knows, or else 2.
+            path: checkpoint of a detector trained on real events.
+            partition_split_32: of an RVT as it was trained; None for what the checkpoint knows, or
+                else 2.
+            settings: what builds a detector of your own, see `built`; None for an RVT.
 
         Raises:
             FileNotFoundError: there is no such file.
-            ValueError: the file holds no detector of a known size, or one of another partition.
+            ValueError: the file holds no such detector, or an RVT of no known size or of another
+                partition.
         """
-        backbone, shape = trained_backbone(path, partition_split_32)
-        return cls._of_rvt(backbone, shape, f"weights of {Path(path).name}")
+        description = f"weights of {Path(path).name}"
+        if settings is not None:
+            own = OwnNetwork(settings=settings)
+            return cls._of(own.trained(path), own, description)
+        return cls._of(*trained_backbone(path, partition_split_32), description)
 
     @classmethod
-    def _of_rvt(cls, backbone: RVTBackbone, shape: RVTShape, description: str) -> Self:
-        return cls(
-            backbone=backbone,
-            definition=Definition(bins=shape.bins, architecture=shape.architecture),
-            weights_sha256=weights_sha256(backbone),
-            shape=shape,
-            description=description,
-        )
+    def _of(cls, backbone: nn.Module, network: Network, description: str) -> Self:
+        shown = cast(TappedBackbone, backbone)
+        judge = cls.of(shown, architecture=network.architecture)
+        return replace(judge, network=network, description=description)
 
     @classmethod
     def load(cls, place: Path | str, partition_split_32: int | None = None) -> Self:
@@ -113,10 +141,9 @@ class Judge:
         """
         path = Path(place)
         folder = path.parent if path.name == WEIGHTS else path
-        given = {} if partition_split_32 is None else {"partition_split_32": partition_split_32}
         if (folder / RECORD).is_file():
             judge = cls(**read_judge(folder))
-            trained = judge._rvt_shape().partition_split_32
+            trained = judge.network.record().get("partition_split_32") if judge.network else None
             if partition_split_32 not in (None, trained):
                 raise ValueError(
                     f"Expected the judge in {folder} with partition_split_32={trained}, as it was "
@@ -124,30 +151,29 @@ class Judge:
                 )
             return judge
         if str(place) == "random":
-            return cls.random(**given)
+            return cls.random(partition_split_32=partition_split_32 or RVTShape.partition_split_32)
         if path.is_dir():
             raise FileNotFoundError(
                 f"Expected {RECORD} in {path}, got a folder without; set eqs.judge to the folder "
                 "of a finished `train.py sim=real`, or to a checkpoint"
             )
-        return cls.from_checkpoint(path, **given)
+        return cls.from_checkpoint(path, partition_split_32)
 
     def save(self, folder: Path | str) -> None:
         """Write the folder that `load` reads; weights that lie there already are kept.
 
         Raises:
-            ValueError: the network is no RVT, so nothing could build it again.
+            ValueError: the network is only in memory, so nothing could build it again.
         """
-        shape = self._rvt_shape()
-        assert isinstance(self.backbone, RVTBackbone)  # as the shape says
-        parts = self.backbone, shape, self.definition, self.centres, self.description
+        module = cast(nn.Module, self.backbone)
+        parts = module, self._network(), self.definition, self.centres, self.description
         write_judge(Path(folder), *parts)
 
     def define(self, **chosen: Any) -> Definition:  # noqa: ANN401
         """The judge's definition with other choices.
 
         Raises:
-            ValueError: there is no such choice, or not that value of it.
+            ValueError: there is no such choice, or not that value of it, or no such activation.
         """
         unknown = chosen.keys() - {*choices()}
         if unknown:
@@ -160,6 +186,7 @@ class Judge:
                 f"Expected {self.definition.bins} bins, as the judge was trained with, got "
                 f"{chosen['bins']}; set eqs.bins or eqs.judge"
             )
+        require_taps(self.backbone, [chosen.get("tap", self.definition.tap)])
         stages = tuple(chosen.get("stages", self.definition.stages))
         return replace(self.definition, **{**chosen, "stages": stages})
 
@@ -230,18 +257,19 @@ class Judge:
         """The control of this judge: its network with random weights and no centre.
 
         Raises:
-            ValueError: the network is no RVT.
+            ValueError: the network is only in memory, so nothing could build it again.
         """
-        control = Judge.random(seed, **asdict(self._rvt_shape())).to(self.device)
-        return replace(control, definition=replace(self.definition, features="raw"))
+        network = self._network()
+        control = Judge._of(network.untrained(seed), network, "random weights, a control")
+        return replace(control.to(self.device), definition=replace(self.definition, features="raw"))
 
-    def _rvt_shape(self) -> RVTShape:
-        if self.shape is None:
+    def _network(self) -> Network:
+        if self.network is None:
             raise ValueError(
-                f"Expected an RVT, which can be built anew, got a {self.definition.architecture}; "
-                "use a judge that is one"
+                "Expected a network that can be built anew, got a "
+                f"{self.definition.architecture} that is only in memory; use Judge.built"
             )
-        return self.shape
+        return self.network
 
     @property
     def device(self) -> torch.device:

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from torch import nn
 
 from eqs.files import complete_file, read_json, write_json
 from eqs.metrics.centre import Centre
 from eqs.metrics.definition import Definition
-from eqs.metrics.network import RVTShape, trained_backbone, weights_sha256
-from eqs.models import RVTBackbone
-from eqs.models.checkpoint import GEOMETRY
+from eqs.metrics.network import Network, network_of, weights_sha256
 
 RECORD, WEIGHTS = "judge.json", "weights.ckpt"
 
@@ -27,7 +26,7 @@ def read_judge(folder: Path) -> dict[str, Any]:
     """
     record = read_json(folder / RECORD)
     try:
-        shape = RVTShape(**record["network"])
+        network = network_of(record["network"])
         stages = tuple(record["definition"].pop("stages"))
         definition = Definition(**record["definition"], stages=stages)
         files, description = record["centres"], record["description"]
@@ -37,7 +36,7 @@ def read_judge(folder: Path) -> dict[str, Any]:
             f"Expected a judge written by this package in {folder}, got a {RECORD} that lacks or "
             f"adds {error}; delete that file and type the command again"
         ) from error
-    backbone, _ = trained_backbone(weights, shape.partition_split_32)
+    backbone = network.trained(weights)
     centres = {name: Centre.load(folder / name) for name in files}
     changed = [name for name, centre in centres.items() if centre.sha256 != files[name]]
     if weights_sha256(backbone) != digest:
@@ -52,33 +51,31 @@ def read_judge(folder: Path) -> dict[str, Any]:
         "definition": definition,
         "weights_sha256": digest,
         "centres": tuple(centres.values()),
-        "shape": shape,
+        "network": network,
         "description": description,
     }
 
 
 def write_judge(
     folder: Path,
-    backbone: RVTBackbone,
-    shape: RVTShape,
+    backbone: nn.Module,
+    network: Network,
     definition: Definition,
     centres: Sequence[Centre],
     description: str,
 ) -> None:
     """Write what `read_judge` reads; weights that lie there already are kept."""
     digest = weights_sha256(backbone)
-    if not _holds(folder / WEIGHTS, digest, shape):
-        weights = {f"backbone.{name}": x.cpu() for name, x in backbone.state_dict().items()}
-        weights[GEOMETRY] = shape.partition_split_32
+    if not _holds(folder / WEIGHTS, digest, network):
         with complete_file(folder / WEIGHTS) as partial:
-            torch.save(weights, partial)
+            torch.save(network.entries(backbone), partial)
     for centre in centres:
         centre.save(folder / file_of(centre))
     write_json(
         folder / RECORD,
         {
             "description": description,
-            "network": asdict(shape),
+            "network": network.record(),
             "definition": asdict(definition),
             "weights": WEIGHTS,
             "weights_sha256": digest,
@@ -92,7 +89,7 @@ def file_of(centre: Centre) -> str:
     return "-".join(filter(None, ("centre", centre.tap, centre.features_hash))) + ".npz"
 
 
-def _holds(weights: Path, digest: str, shape: RVTShape) -> bool:
+def _holds(weights: Path, digest: str, network: Network) -> bool:
     if not weights.is_file():
         return False
-    return weights_sha256(trained_backbone(weights, shape.partition_split_32)[0]) == digest
+    return weights_sha256(network.trained(weights)) == digest

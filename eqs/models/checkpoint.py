@@ -16,6 +16,8 @@ LISTED = 5
 KEYS = "model.weights"
 GEOMETRY = "partition_split_32"  # under which our own checkpoints keep it
 PUBLISHED_SPLIT = 2
+TRAINED = "model."  # before the names of what a training module holds
+RECORD = "detector"  # under which our own checkpoints say what the detector is
 RESUMED = {"state_dict", "optimizer_states", "lr_schedulers", "pytorch-lightning_version"}
 
 
@@ -41,7 +43,7 @@ def read_weights(path: str | Path, key: str = KEYS) -> dict[str, Tensor]:
         FileNotFoundError: no such file.
         ValueError: not a checkpoint, no detector in it, or several.
     """
-    return _detector_in(_content(path, key), path, key)
+    return _detector_in(read_content(path, key), path, key)
 
 
 def partition_of(path: str | Path, given: int | None, key: str = KEYS) -> int:
@@ -58,7 +60,7 @@ def partition_of(path: str | Path, given: int | None, key: str = KEYS) -> int:
         FileNotFoundError: no such file.
         ValueError: not a checkpoint, or the file knows another.
     """
-    stored = _content(path, key).get(GEOMETRY)
+    stored = read_content(path, key).get(GEOMETRY)
     if given is not None and stored not in (None, given):
         raise ValueError(
             f"Expected partition_split_32={stored}, with which {path} was trained, got {given}; "
@@ -67,7 +69,13 @@ def partition_of(path: str | Path, given: int | None, key: str = KEYS) -> int:
     return next((int(each) for each in (given, stored) if each is not None), PUBLISHED_SPLIT)
 
 
-def _content(path: str | Path, key: str) -> dict[str, Any]:
+def read_content(path: str | Path, key: str = KEYS) -> dict[str, Any]:
+    """Everything in a checkpoint; nothing but tensors and plain values is unpickled.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: not a checkpoint.
+    """
     if not Path(path).is_file():
         raise FileNotFoundError(f"Expected a checkpoint at {path}, got no such file; set {key}")
     try:
@@ -91,6 +99,41 @@ def _detector_in(content: dict[str, Any], path: str | Path, key: str) -> dict[st
         )
     prefix = prefixes[0]
     return {name.removeprefix(prefix): x for name, x in tensors.items() if name.startswith(prefix)}
+
+
+def trained_weights(content: dict[str, Any], path: str | Path) -> dict[str, Tensor]:
+    """The entries of the network that our training module holds, or those of a plain file.
+
+    Raises:
+        ValueError: there are none.
+    """
+    stem = TRAINED if "state_dict" in content else ""
+    entries = content.get("state_dict", content)
+    found = {
+        str(name).removeprefix(stem): x
+        for name, x in entries.items()
+        if str(name).startswith(stem) and isinstance(x, Tensor)
+    }
+    if not found:
+        raise ValueError(f"Expected weights of a trained network in {path}, got none")
+    return found
+
+
+def load_trained(model: nn.Module, path: str | Path, key: str = KEYS) -> None:
+    """Load the weights that a training left into a network of the same settings.
+
+    Args:
+        model: the network.
+        path: checkpoint file.
+        key: configuration key to name in errors.
+
+    Raises:
+        FileNotFoundError: no such file.
+        ValueError: missing, unexpected or differently shaped entries.
+    """
+    weights = trained_weights(read_content(path, key), path)
+    check_entries(model.state_dict(), weights, path, f"{key} to another file")
+    model.load_state_dict(weights)
 
 
 def shape_of(weights: dict[str, Tensor], path: str | Path) -> WeightShape:
@@ -141,16 +184,17 @@ def check_resumable(model: nn.Module, path: str | Path) -> dict[str, Any]:
         FileNotFoundError: no such file.
         ValueError: not a checkpoint of a training, or one of another detector.
     """
-    content = _content(path, "ckpt_path")
-    weights = _detector_in(content, path, "ckpt_path")
-    classes = len(model.state_dict()[CLASS_BIAS])
-    stored = shape_of(weights, path).num_classes
-    if stored != classes:
-        raise ValueError(
-            f"Expected a training of {classes} classes to resume, got {stored} in {path}; set "
-            "ckpt_path to another, or model.weights to it with model.new_class_branch=true"
-        )
-    check_entries(model.state_dict(), weights, path)
+    content, own = read_content(path, "ckpt_path"), model.state_dict()
+    weights = trained_weights(content, path)
+    if {CLASS_BIAS} <= own.keys() & weights.keys():
+        classes, stored = len(own[CLASS_BIAS]), len(weights[CLASS_BIAS])
+        if stored != classes:
+            raise ValueError(
+                f"Expected a training of {classes} classes to resume, got {stored} in {path}; set "
+                "ckpt_path to another, or model.weights to it with model.new_class_branch=true"
+            )
+    keys = [] if CLASS_BIAS in own else ["what lies below model to the checkpoint's"]
+    check_entries(own, weights, path, *keys)
     missing = sorted(RESUMED - content.keys())
     if missing:
         raise ValueError(

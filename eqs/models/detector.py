@@ -151,6 +151,17 @@ class RVTDetector(nn.Module):
         for stage in self.backbone.stages:
             stage.compile(backend=backend)
 
+    @property
+    def partition_split_32(self) -> int:
+        """Attention windows per side of the last stage, which checkpoints keep."""
+        return self.backbone.partition_split_32
+
+    def forward_sequence(
+        self, histograms: Tensor, states: States | None = None
+    ) -> tuple[list[Tensor], States]:
+        """Features (T, N, C, h, w) of the four stages for T windows (T, N, in_channels, H, W)."""
+        return self.backbone.forward_sequence(histograms, states)
+
     def forward(self, x: Tensor, states: States | None = None) -> tuple[Tensor, States]:
         """Detect in one time step.
 

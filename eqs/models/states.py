@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import torch
 from torch import Tensor, distributed
@@ -11,26 +12,66 @@ from eqs.models.lstm import State
 from eqs.models.synchronised import processes
 
 States = list[State]
+"""Those of RVT: (hidden, cell) of every stage."""
+
+# Those of any detector: tensors with one entry per sample along the first axis, in lists, tuples
+# and dicts; None for a detector without.
+Carried = Any
 
 
-def reset_states(states: States | None, first: Tensor) -> States | None:
-    """Zero the states of the samples that start a new sequence.
+def map_states(change: Callable[..., Tensor], states: Carried, *others: Carried) -> Carried:
+    """States with every tensor changed; given several, tensors of one place are changed together.
 
-    Args:
-        states: (h, c) of every stage, each (N, C, h, w), or None.
-        first: (N,) bool, True where the next frame has no past.
+    Raises:
+        ValueError: there is something else than tensors in lists, tuples and dicts.
+
+    Example:
+        >>> map_states(lambda x: 2 * x, [torch.ones(1), None])
+        [tensor([2.]), None]
     """
     if states is None:
         return None
-    again = first.view(-1, 1, 1, 1)
-    return [(hidden.masked_fill(again, 0), cell.masked_fill(again, 0)) for hidden, cell in states]
+    if isinstance(states, Tensor):
+        return change(states, *others)
+    if isinstance(states, dict):
+        return {
+            name: map_states(change, each, *(other[name] for other in others))
+            for name, each in states.items()
+        }
+    if type(states) in (list, tuple):
+        parts = zip(states, *others, strict=True)
+        return type(states)(map_states(change, *each) for each in parts)
+    raise ValueError(
+        f"Expected states of tensors in lists, tuples and dicts, got a {type(states).__name__}; "
+        "change the detector's forward_sequence"
+    )
 
 
-def detach_states(states: States | None) -> States | None:
+def reset_states(states: Carried, first: Tensor) -> Carried:
+    """Zero the states of the samples that start a new sequence.
+
+    Args:
+        states: as a detector carries them, or None.
+        first: (N,) bool, True where the next frame has no past.
+
+    Raises:
+        ValueError: a state has not one entry per sample along its first axis.
+    """
+
+    def reset(state: Tensor) -> Tensor:
+        if state.ndim < 1 or len(state) != len(first):
+            raise ValueError(
+                f"Expected states with one entry for each of {len(first)} samples along the first "
+                f"axis, got shape {tuple(state.shape)}; change the detector's forward_sequence"
+            )
+        return state.masked_fill(first.view(-1, *[1] * (state.ndim - 1)), 0)
+
+    return map_states(reset, states)
+
+
+def detach_states(states: Carried) -> Carried:
     """The same values without their history, for truncated backpropagation."""
-    if states is None:
-        return None
-    return [(hidden.detach(), cell.detach()) for hidden, cell in states]
+    return map_states(Tensor.detach, states)
 
 
 def gather_frames(features: Sequence[Tensor], keep: Tensor) -> list[Tensor]:
@@ -47,28 +88,21 @@ def gather_frames(features: Sequence[Tensor], keep: Tensor) -> list[Tensor]:
     return [x.permute(0, 3, 1, 2) for x in picked]
 
 
-def of_all_processes(states: States | None) -> States | None:
+def of_all_processes(states: Carried) -> Carried:
     """The states of the whole batch, on the CPU: those of the first process come first."""
     if processes() == 1 or states is None:
         return states
-    parts: list[States] = [[]] * processes()
+    parts: list[Carried] = [None] * processes()
     distributed.all_gather_object(parts, move_states(states, torch.device("cpu")))
-    return [
-        (torch.cat([hidden for hidden, _ in stage]), torch.cat([cell for _, cell in stage]))
-        for stage in zip(*parts, strict=True)
-    ]
+    return map_states(lambda *same: torch.cat(same), *parts)
 
 
-def of_this_process(states: States | None) -> States | None:
+def of_this_process(states: Carried) -> Carried:
     """This process's part of the whole batch's states."""
-    if states is None:
-        return None
     rank = distributed.get_rank() if processes() > 1 else 0
-    return [
-        (hidden.chunk(processes())[rank], cell.chunk(processes())[rank]) for hidden, cell in states
-    ]
+    return map_states(lambda state: state.chunk(processes())[rank], states)
 
 
-def move_states(states: States, device: torch.device) -> States:
+def move_states(states: Carried, device: torch.device) -> Carried:
     """Recurrent states on another device."""
-    return [(hidden.to(device), cell.to(device)) for hidden, cell in states]
+    return map_states(lambda state: state.to(device), states)

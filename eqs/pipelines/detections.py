@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import torch
 
 from eqs.data import LabelProtocol, Recording
 from eqs.drawing import Boxes
-from eqs.models import RVTDetector
+from eqs.models import Detector
+from eqs.pipelines.detector import trained_detector
 from eqs.pipelines.runs import Run
 from eqs.training import Binning, EvaluationDataset, Selection, WindowSource, boxes_of
 
@@ -36,15 +38,13 @@ def detections_over(
     source = WindowSource(
         recording=recording, events_path=events_path, protocol=protocol, binning=binning
     )
-    model = RVTDetector.from_checkpoint(
-        run.weights, partition_split_32=config.model.partition_split_32
-    ).eval()
+    model = cast(Detector, trained_detector(run))
     selection = Selection(protocol, config.task.confidence_threshold, config.task.nms_threshold)
     states = None
     chunks = EvaluationDataset([source], chunk_length=10)
     for chunk in range(len(chunks)):
         with torch.no_grad():
             histograms = chunks[chunk]["histograms"].float()
-            maps, states = model.backbone.forward_sequence(histograms, states)
+            maps, states = model.forward_sequence(histograms, states)
             predictions = model.detect([stage.flatten(0, 1) for stage in maps])
         yield from map(boxes_of, selection(predictions, recording.width))

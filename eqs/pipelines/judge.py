@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -17,13 +17,18 @@ from eqs.data import Dataset
 from eqs.events import EventReader
 from eqs.files import short_hash
 from eqs.metrics import Judge
+from eqs.metrics.features import NAMED, tap_names
 from eqs.metrics.judge_folder import RECORD
+from eqs.metrics.network import OwnNetwork
+from eqs.models import RVTDetector
+from eqs.models.settings import class_of
+from eqs.pipelines.detector import plain, settings_of
 from eqs.pipelines.recipe import data_hash, recipe_hash
 from eqs.pipelines.runs import Run, finished_runs
 
 log = logging.getLogger(__name__)
 EMBEDDED_DATA = "dsec_mini"
-# Activations whose mean real feature a trained judge keeps, for whoever reads them later.
+# Activations of an RVT whose mean real feature a trained judge keeps, for whoever reads them later.
 KEPT_TAPS = ("hidden", "gate", "downsample")
 
 
@@ -52,23 +57,54 @@ def require_judge(cfg: DictConfig) -> None:
             device here.
     """
     scoring_device(cfg.device)
-    if cfg.eqs.judge not in (None, "random") and not Path(cfg.eqs.judge).exists():
+    if isinstance(cfg.eqs.judge, DictConfig):
+        class_of(cfg.eqs.judge, "eqs.judge")
+    elif cfg.eqs.judge not in (None, "random") and not Path(cfg.eqs.judge).exists():
         raise FileNotFoundError(f"Expected a judge at {cfg.eqs.judge}, found none; set eqs.judge")
     if cfg.eqs.judge is None and not trained_on_real(cfg):
         raise ValueError(
             "Expected a judge trained on real events, got none: type `python train.py sim=real` "
-            "first, or set eqs.judge to a judge's folder or a checkpoint"
+            "first (with a detector that has taps, as RVT does), or set eqs.judge to a judge's "
+            "folder or a checkpoint"
         )
 
 
 def trained_on_real(cfg: DictConfig) -> list[Run]:
-    """Detectors trained on the real stream of the configured data, or else of the embedded ones."""
+    """Detectors trained on the real stream of the configured data, or else of the embedded ones.
+
+    Those that can judge, that is.
+    """
     for name in dict.fromkeys([cfg.data.name, EMBEDDED_DATA]):
         found = finished_runs(Path(cfg.paths.runs) / name)
-        trained = [run for run in found if run.result.simulator == "real"]
+        trained = [run for run in found if run.result.simulator == "real" and can_judge(run)]
         if trained:
             return trained
     return []
+
+
+def can_judge(run: Run) -> bool:
+    """Whether a training left a judge, or a detector that shows its inner maps."""
+    if (run.folder / RECORD).is_file():
+        return True
+    try:
+        own = own_settings(run.config())
+        return own is None or _shows_maps(own)
+    except ValueError:  # its class is not here any more
+        return False
+
+
+def own_settings(cfg: DictConfig) -> dict[str, Any] | None:
+    """What builds a detector of somebody's own again; None for an RVT, whose backbone judges.
+
+    Raises:
+        ValueError: there is no such class.
+    """
+    settings = settings_of(cfg)
+    return None if issubclass(class_of(settings), RVTDetector) else settings
+
+
+def _shows_maps(settings: Mapping[str, Any]) -> bool:
+    return hasattr(class_of(settings), "taps")
 
 
 def find_judge(cfg: DictConfig, data: Dataset | None) -> Found:
@@ -108,14 +144,24 @@ def find_judge(cfg: DictConfig, data: Dataset | None) -> Found:
 
 
 def _given_judge(cfg: DictConfig, data: Dataset | None) -> Found:
+    if isinstance(cfg.eqs.judge, DictConfig):
+        judge = Judge.built(plain(cfg.eqs.judge))
+        return _with_kept_centres(cfg, judge, data)
     judge = Judge.load(cfg.eqs.judge, cfg.eqs.partition_split_32)
     place = Path(cfg.eqs.judge)
     run = Run(place if place.is_dir() else place.parent)
     if run.finished and (run.folder / RECORD).is_file():
         return Found(judge, run.folder, _data_of(run))
+    return _with_kept_centres(cfg, judge, data)
+
+
+def _with_kept_centres(cfg: DictConfig, judge: Judge, data: Dataset | None) -> Found:
     # A judge that somebody made stays as it is; what it lacks here is kept with our results.
     given = frozenset(centre.sha256 for centre in judge.centres)
-    folder = Path(cfg.paths.results) / cfg.data.name / f"judge-{judge.weights_sha256[:12]}"
+    name = f"judge-{judge.weights_sha256[:12]}"
+    if isinstance(judge.network, OwnNetwork):  # of which equal weights may compute another thing
+        name += f"-{judge.network.architecture}"
+    folder = Path(cfg.paths.results) / cfg.data.name / name
     if (folder / RECORD).is_file():
         kept = Judge.load(folder)
         made = tuple(centre for centre in kept.centres if centre.sha256 not in given)
@@ -150,22 +196,38 @@ def _data_of(run: Run) -> Dataset:
 def write_judge(cfg: DictConfig, run: Run, data: Dataset, device: torch.device) -> None:
     """Make a judge of a detector trained on real events and keep it in the run's folder.
 
+    A detector without taps is none, and a line says so.
+
     Args:
         cfg: the configuration of the training.
         run: the training, whose weights are there.
         data: the data set, whose training recordings the judge is centred on.
         device: where the features are computed.
     """
-    judge = Judge.from_checkpoint(run.weights, cfg.model.partition_split_32).to(device)
+    own = own_settings(cfg)
+    if own is not None and not _shows_maps(own):
+        log.info(
+            "no judge is written: the network %s has no taps; one with %s would be kept as a judge",
+            class_of(own).__name__,
+            ", ".join(NAMED),
+        )
+        return
+    split = None if own is not None else cfg.model.partition_split_32
+    judge = Judge.from_checkpoint(run.weights, split, own).to(device)
+    named = f"RVT-{cfg.model.size}" if own is None else class_of(own).__name__
     binning = {name: cfg.datamodule[name] for name in ("window_us", "count_cutoff")}
     world = "a rendered world" if cfg.data.name.startswith(EMBEDDED_DATA) else "real recordings"
     judge = replace(
         judge,
         definition=judge.define(**binning),
-        description=f"RVT-{cfg.model.size} trained on the recorded events of {cfg.data.name}, "
-        f"{world}",
+        description=f"{named} trained on the recorded events of {cfg.data.name}, {world}",
     )
-    centred(judge, data, KEPT_TAPS, None, {}).save(run.folder)
+    centred(judge, data, kept_taps(judge), None, {}).save(run.folder)
+
+
+def kept_taps(judge: Judge) -> Sequence[str]:
+    """Activations that are centred and scored where nobody chooses: all that a network names."""
+    return tap_names(judge.backbone) if hasattr(judge.backbone, "tap_names") else KEPT_TAPS
 
 
 def centred(

@@ -53,7 +53,7 @@ def recipe(cfg: DictConfig) -> dict[str, Any]:
                 config = OmegaConf.is_config(value)
                 plain = OmegaConf.to_container(value, resolve=True) if config else value
                 found |= _flat(plain, f"{part}.{name}")
-    weights = cfg.model.weights
+    weights = cfg.model.get("weights")
     if weights is not None:
         if not Path(weights).is_file():
             raise FileNotFoundError(

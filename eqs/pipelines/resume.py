@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
+from torch import nn
 
-from eqs.models import RVTDetector
 from eqs.models.checkpoint import check_resumable
 from eqs.pipelines.recipe import differences, recipe
 from eqs.pipelines.runs import Run
@@ -34,7 +34,7 @@ def identity_of(cfg: DictConfig, stream: str, data: str) -> dict[str, Any]:
 
 
 def checkpoint_path(
-    cfg: DictConfig, run: Run, shorter: Run | None, identity: Mapping[str, Any], model: RVTDetector
+    cfg: DictConfig, run: Run, shorter: Run | None, identity: Mapping[str, Any], model: nn.Module
 ) -> Path | None:
     """Where to go on, or None to begin; the checkpoint is one of this very training.
 

@@ -14,8 +14,15 @@ from eqs.data import Dataset
 from eqs.events import EventReader
 from eqs.metrics import EventQualityScore, Judge, Reading, StreamScore
 from eqs.metrics.definition import choices
+from eqs.metrics.features import require_taps
 from eqs.metrics.scoring import Watcher
-from eqs.pipelines.judge import centred, find_judge, scoring_device, training_content
+from eqs.pipelines.judge import (
+    centred,
+    find_judge,
+    kept_taps,
+    scoring_device,
+    training_content,
+)
 
 log = logging.getLogger(__name__)
 
@@ -71,7 +78,9 @@ def find_scoring(cfg: DictConfig, data: Dataset | None) -> Scoring:
     judge.to(device)
     chosen = {name: cfg.eqs[name] for name in choices() if cfg.eqs[name] is not None}
     definition = judge.define(**chosen)
-    taps = list(dict.fromkeys([definition.tap, *cfg.taps]))
+    beside = kept_taps(judge) if cfg.taps is None else cfg.taps
+    taps = list(dict.fromkeys([definition.tap, *beside]))
+    require_taps(judge.backbone, taps)
     content = training_content(training)
 
     def lacks(tap: str) -> bool:
@@ -86,7 +95,7 @@ def find_scoring(cfg: DictConfig, data: Dataset | None) -> Scoring:
         judge = centred(judge, training, missing, cfg.eqs.chunk_windows, chosen)
         judge.save(folder)
     # Partial, since Hydra would take the judge for a configuration and open it.
-    metric = instantiate(cfg.eqs, _partial_=True)(judge=judge).to(device)
+    metric = instantiate(cfg.eqs, judge=None, _partial_=True)(judge=judge).to(device)
     return Scoring(metric=metric, readings=readings_of(metric, taps))
 
 

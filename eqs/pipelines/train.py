@@ -19,6 +19,7 @@ from eqs.data import Dataset, EventSource, LabelProtocol, RecordedEvents
 from eqs.files import one_at_a_time, short_hash
 from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
+from eqs.pipelines.detector import build_detector, record_of
 from eqs.pipelines.judge import write_judge
 from eqs.pipelines.prepare import prepare_data, prepare_stream
 from eqs.pipelines.recipe import data_hash, recipe, recipe_hash, trials
@@ -177,11 +178,10 @@ def finish(
 
 def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]) -> DetectionTask:
     """The configured detector in its training module."""
-    model = instantiate(cfg.model)
-    if cfg.compile:
-        model.compile_stages()
-    build = instantiate(cfg.task)
-    task: DetectionTask = build(model=model, protocol=protocol, test_streams=test_streams)
+    model, record = build_detector(cfg), record_of(cfg)
+    task: DetectionTask = instantiate(cfg.task)(
+        model=model, protocol=protocol, test_streams=test_streams, record=record
+    )
     return task
 
 

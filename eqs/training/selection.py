@@ -30,7 +30,7 @@ class Selection:
         """The detections of each frame.
 
         Args:
-            predictions: of each frame, as `RVTDetector.detect` gives them.
+            predictions: of each frame, as `Detector.detect` gives them.
             width: columns of the sensor, which the protocol's sizes are relative to.
         """
         found = postprocess(

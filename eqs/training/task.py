@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
 import lightning
 import torch
@@ -15,16 +15,15 @@ from torch.optim.lr_scheduler import LRScheduler
 
 from eqs.data import LabelProtocol
 from eqs.metrics import Accuracy, MeanAveragePrecision
-from eqs.models import (
-    Detections,
-    RVTDetector,
-    States,
-    detach_states,
-    gather_frames,
-    reset_states,
+from eqs.models import Detections, Detector, detach_states, gather_frames, reset_states
+from eqs.models.checkpoint import GEOMETRY, RECORD
+from eqs.models.protocol import (
+    check_features,
+    check_losses,
+    check_predictions,
+    require_detector,
 )
-from eqs.models.checkpoint import GEOMETRY
-from eqs.models.states import move_states, of_all_processes, of_this_process
+from eqs.models.states import Carried, move_states, of_all_processes, of_this_process
 from eqs.models.synchronised import mean_over_processes
 from eqs.training.checkpoints import require_finite
 from eqs.training.datasets import Batch
@@ -34,33 +33,40 @@ PROGRESS = ("last_epoch", "_step_count", "_last_lr")  # of a schedule; the rest 
 
 
 class DetectionTask(lightning.LightningModule):
-    """Train and evaluate an RVT detector on batches of consecutive windows.
+    """Train and evaluate a detector on batches of consecutive windows.
 
     Convention: states flow from a batch to the next one of the same slot and are cut from the
     gradient in between; rows marked `first` start from zero.
 
     Args:
-        model: the detector.
+        model: the detector, a module with what `Detector` asks.
         optimizer: builds the optimizer from the parameters.
         scheduler: builds the schedule, stepped once per batch, from the optimizer.
         protocol: the classes, and which detections enter a mAP with which score.
         test_streams: name of each test dataloader's event stream.
         confidence_threshold: objectness times class probability below which a box is dropped.
         nms_threshold: overlap above which the weaker of two boxes of a class is dropped.
+        record: what checkpoints say of the detector beside its classes and the size of its input,
+            as `load_detector` reads it.
+
+    Raises:
+        ValueError: the model lacks a method of a detector.
     """
 
     def __init__(
         self,
-        model: RVTDetector,
+        model: nn.Module,
         optimizer: Callable[[Iterable[nn.Parameter]], Optimizer],
         scheduler: Callable[[Optimizer], LRScheduler],
         protocol: LabelProtocol,
         test_streams: Sequence[str] = (),
         confidence_threshold: float = 0.001,
         nms_threshold: float = 0.45,
+        record: Mapping[str, Any] | None = None,
     ) -> None:
         """Keep the parts and prepare one mAP for each stream."""
         super().__init__()
+        require_detector(model)
         self.model = model
         self.make_optimizer = optimizer
         self.make_scheduler = scheduler
@@ -73,16 +79,31 @@ class DetectionTask(lightning.LightningModule):
         self.test_metrics = nn.ModuleList(self.test_precision)  # so that they move with the task
         self.measured: dict[str, Accuracy] = {}
         """What the last validation or test found, by the name of the stream, `val` among them."""
-        self._train_states: States | None = None
-        self._evaluation_states: States | None = None
+        self.record = dict(record or {})
+        self._train_states: Carried = None
+        self._evaluation_states: Carried = None
+
+    @property
+    def detector(self) -> Detector:
+        """The model as what a training asks of it."""
+        return cast(Detector, self.model)
+
+    def _run(self, batch: Batch, states: Carried) -> tuple[Sequence[Tensor], Carried]:
+        """Features of a chunk's windows, and the states after it."""
+        histograms = batch["histograms"].float()
+        again = reset_states(states, batch["first"])
+        maps, states = self.detector.forward_sequence(histograms, again)
+        check_features(maps, *histograms.shape[:2])
+        self.record |= dict(zip(("height", "width"), histograms.shape[-2:], strict=True))
+        return maps, states
 
     def training_step(self, batch: Batch, batch_idx: int) -> Tensor:
         """Loss over all labelled frames of the chunk, in one call of neck and head."""
-        states = reset_states(self._train_states, batch["first"])
-        maps, states = self.model.backbone.forward_sequence(batch["histograms"].float(), states)
+        maps, states = self._run(batch, self._train_states)
         self._train_states = detach_states(states)
         labelled = batch["labelled"]
-        losses = self.model.loss(gather_frames(maps, labelled), batch["labels"][labelled])
+        losses = self.detector.loss(gather_frames(maps, labelled), batch["labels"][labelled])
+        check_losses(losses)
         self._require_finite(losses)
         self.log_dict({f"train/{name}": value.detach() for name, value in losses.items()})
         self.log("loss", losses["loss"].detach(), prog_bar=True, logger=False)
@@ -133,14 +154,12 @@ class DetectionTask(lightning.LightningModule):
         Returns:
             One dict per labelled frame with boxes (n, 4) as x1 y1 x2 y2 pixels, scores, labels.
         """
-        states = reset_states(self._evaluation_states, batch["first"])
-        maps, self._evaluation_states = self.model.backbone.forward_sequence(
-            batch["histograms"].float(), states
-        )
+        maps, self._evaluation_states = self._run(batch, self._evaluation_states)
         labelled = batch["labelled"]
         if not labelled.any():
             return []
-        predictions = self.model.detect(gather_frames(maps, labelled))
+        predictions = self.detector.detect(gather_frames(maps, labelled))
+        check_predictions(predictions, int(labelled.sum()), len(self.protocol.class_names))
         return self.selection(predictions, batch["histograms"].shape[-1])
 
     def _begin(self, *metrics: MeanAveragePrecision) -> None:
@@ -187,7 +206,10 @@ class DetectionTask(lightning.LightningModule):
             ValueError: a weight is not finite.
         """
         require_finite(checkpoint["state_dict"], checkpoint["global_step"])
-        checkpoint[GEOMETRY] = self.model.backbone.partition_split_32
+        classes = list(self.protocol.class_names)
+        checkpoint[RECORD] = {**self.record, "class_names": classes}
+        if hasattr(self.model, GEOMETRY):  # for whoever reads the weights alone
+            checkpoint[GEOMETRY] = getattr(self.model, GEOMETRY)
         checkpoint["train_states"] = of_all_processes(self._train_states)
 
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:

@@ -56,7 +56,6 @@ def test_warmup_is_at_most_a_quarter(windows, warmup):
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
-        ({"tap": "nose"}, "tap among .* got 'nose'; set eqs.tap"),
         ({"stages": ()}, "stages counted from 1"),
         ({"stages": (2, 1)}, "stages counted from 1"),
         ({"stages": (0, 1)}, "stages counted from 1"),

@@ -79,7 +79,7 @@ def test_centres_of_other_pooling_stand_beside_the_first(judge, make_events, tmp
 
 def test_the_untrained_control_has_the_same_shape(judge):
     control = judge.untrained()
-    assert control.shape == judge.shape
+    assert control.network == judge.network
     assert control.weights_sha256 == Judge.random(**TINY).weights_sha256 != judge.weights_sha256
     assert control.definition == replace(judge.definition, features="raw")
 
@@ -111,13 +111,15 @@ def test_foreign_and_missing_files_are_named(judge, tmp_path, backbone):
     (tmp_path / "judge" / "judge.json").write_text(json.dumps(record))
     with pytest.raises(ValueError, match=r"a judge\.json that lacks or adds 'network'"):
         Judge.load(tmp_path / "judge")
-    with pytest.raises(ValueError, match="Expected an RVT, which can be built anew, got a Small"):
+    with pytest.raises(ValueError, match="that can be built anew, got a SmallBackbone that is on"):
         Judge.of(backbone).save(tmp_path / "small")
 
 
 def test_choices_are_checked(judge):
     with pytest.raises(ValueError, match=r"Expected choices among tap, .* got nose; set one"):
         judge.define(nose=1)
+    with pytest.raises(ValueError, match=r"Expected a tap among gate, .*, got nose; set eqs\.tap"):
+        judge.define(tap="nose")
     with pytest.raises(ValueError, match=r"got 'hex'; set eqs\.patch"):
         judge.define(patch="hex")
     assert judge.define(stages=[1, 2]).stages == (1, 2)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 from hydra import compose, initialize_config_dir
+from omegaconf import OmegaConf
 
 from eqs.events import EventReader
 from eqs.metrics import EventQualityScore, Judge
@@ -17,6 +18,7 @@ from eqs.pipelines.recipe import recipe_hash
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.pipelines.runs import Run
 
+RVT = "eqs.models.RVTDetector"
 CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 
 
@@ -29,8 +31,9 @@ def cfg(tmp_path):
 
 @pytest.fixture
 def finished(result_of):
-    def make(root, name, *, simulator="real", recipe="old", age_s=0):
+    def make(root, name, *, simulator="real", recipe="old", age_s=0, target=RVT):
         run = Run(root / "dsec_mini" / simulator / name)
+        run.save_config(OmegaConf.create({"model": {"_target_": target}}), {})
         run.finish(result_of(simulator, recipe=recipe))
         os.utime(run.folder / "result.json", (1e9 - age_s, 1e9 - age_s))
         return run
@@ -62,6 +65,13 @@ def test_detectors_of_simulated_streams_do_not_judge(chosen, finished, tmp_path)
     finished(tmp_path, "a", simulator="esim")
     with pytest.raises(ValueError, match="Expected a judge trained on real events, got none"):
         chosen()
+
+
+@pytest.mark.parametrize("target", ["torch.nn.Linear", "gone.Detector"])
+def test_detectors_without_taps_do_not_judge(chosen, finished, tmp_path, target):
+    wanted = finished(tmp_path, "a", age_s=100)
+    finished(tmp_path, "b", target=target)
+    assert chosen() == wanted
 
 
 @pytest.mark.parametrize(

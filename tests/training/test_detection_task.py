@@ -1,5 +1,6 @@
 """One step of training and evaluation, on a tiny detector and made-up windows."""
 
+import re
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -186,3 +187,65 @@ def test_a_longer_training_takes_its_schedule_up_where_the_shorter_one_ended() -
     advance(optimiser, going_on, 1)
     advance(reference, long, 1)
     assert optimiser.param_groups[0]["lr"] == pytest.approx(reference.param_groups[0]["lr"])
+
+
+class Toy(torch.nn.Module):
+    """Predicts a box per frame from the mean count, without states."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.linear = torch.nn.Linear(1, 7)
+
+    def forward_sequence(self, histograms, states):
+        return [histograms.mean((2, 3, 4), keepdim=True)], states
+
+    def loss(self, features, labels):
+        return {"loss": self.detect(features).square().mean()}
+
+    def detect(self, features):
+        return self.linear(features[0].flatten(1))[:, None]
+
+
+@pytest.mark.parametrize(
+    ("method", "returns", "sentence"),
+    [
+        (None, None, None),
+        ("forward_sequence", (torch.zeros(3, 2, 1, 1, 1), None), "a list of maps (3, 2, C, h, w)"),
+        ("forward_sequence", ([torch.zeros(3, 2, 1, 1, 1)], [torch.zeros(1)]), "each of 2 samples"),
+        ("loss", torch.zeros(()), "scalars by name with one called loss"),
+        ("detect", torch.zeros(6, 9, 6), "predictions (6, A, 7)"),
+    ],
+)
+def test_a_detector_that_keeps_no_promise_is_told_so(
+    task: DetectionTask, monkeypatch: pytest.MonkeyPatch, method, returns, sentence
+) -> None:
+    toy = DetectionTask(Toy(), partial(SGD, lr=0.1), partial(ConstantLR), task.protocol)
+    if method is not None:
+        monkeypatch.setattr(toy.model, method, lambda *_: returns)
+
+    def two_steps() -> None:
+        for step in range(2):
+            toy.training_step(batch(step, first=False), step)
+        with torch.no_grad():
+            assert len(toy.detect(batch())) == WINDOWS * SAMPLES
+
+    if sentence is None:
+        two_steps()
+    else:
+        with pytest.raises(ValueError, match=re.escape(sentence)):
+            two_steps()
+
+
+def test_what_is_no_detector_is_refused(task: DetectionTask) -> None:
+    with pytest.raises(ValueError, match="got a Linear without forward_sequence, loss, detect"):
+        DetectionTask(torch.nn.Linear(1, 1), SGD, ConstantLR, task.protocol)
+
+
+def test_a_checkpoint_says_what_the_detector_is(task: DetectionTask) -> None:
+    task.record = {"bins": 2}
+    task.training_step(batch(), 0)
+    checkpoint = {"state_dict": task.state_dict(), "global_step": 1}
+    task.on_save_checkpoint(checkpoint)
+    size = {"height": HEIGHT, "width": WIDTH}
+    assert checkpoint["detector"] == {"bins": 2, **size, "class_names": ["car", "pedestrian"]}
+    assert checkpoint["partition_split_32"] == 1
