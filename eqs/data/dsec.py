@@ -143,7 +143,7 @@ class DSECFolder(Dataset):
 
     def load(self, sequence: Places) -> Recording:
         """The recording of a sequence, of the sensor's size."""
-        return Recording.at(sequence, *parse_size(self.size))
+        return Recording.at(self._viewed(sequence), *parse_size(self.size))
 
     def scored_recordings(self) -> list[Recording]:
         """The recordings that simulators are scored on."""
@@ -168,8 +168,7 @@ class DSECFolder(Dataset):
     def _chosen(self, group: str) -> list[Places]:
         found = self._found()
         patterns = self._named()[group]
-        chosen = [found[name] for name in found if any(fnmatchcase(name, p) for p in patterns)]
-        return [self._viewed(places) for places in chosen]
+        return [found[name] for name in found if any(fnmatchcase(name, p) for p in patterns)]
 
     def _viewed(self, places: Places) -> Places:
         """The places of a sequence, with remapped frames where it came without."""
