@@ -17,6 +17,7 @@ PLAIN = {
     "convert": "Convert an event file of any kind to HDF5 in the layout of DSEC.",
     "view": "Show an event file as a GIF, an MP4 or a strip of stills.",
     "watch": "Film what a trained detector finds.",
+    "benchmark": "Time simulators, score, detector, or reading for a training, on this machine.",
     "compare": "Compare trainings: accuracy over wall time, and how their settings differ.",
 }
 HELP = ("-h", "--help")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from benchmarks import plain_rvt
-from benchmarks.rvt import Job, event_tensors, histogram, labels_of, stored_window, training
 
+from eqs.benchmarks import plain_rvt
+from eqs.benchmarks.rvt import Job, event_tensors, histogram, labels_of, stored_window, training
 from eqs.models import RVTDetector
 from eqs.models.loss import detection_loss
 from eqs.models.yolox_head import anchor_grid, decode_boxes
@@ -74,7 +74,7 @@ def test_a_training_step_reaches_every_parameter(plain, monkeypatch):
         made.append(RVTDetector(*arguments, **options))
         return made[-1]
 
-    monkeypatch.setattr("benchmarks.rvt.RVTDetector", remembered)
+    monkeypatch.setattr("eqs.benchmarks.rvt.RVTDetector", remembered)
     training(Job("training", plain=plain, size=(64, 96), steps=2, batch=1))()
     (detector,) = made
     assert [name for name, each in detector.named_parameters() if each.grad is None] == []

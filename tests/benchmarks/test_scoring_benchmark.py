@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from benchmarks.scoring import SET_UP, Job, histograms, pair
 
+from eqs.benchmarks.scoring import SET_UP, Job, histograms, pair
 from eqs.metrics import Judge
 
 

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.simulators import PERIOD_US, Job, configured, draw_clip, measure
 from PIL import Image
+
+from eqs.benchmarks.simulators import PERIOD_US, Job, configured, draw_clip, measure
 
 
 @pytest.fixture

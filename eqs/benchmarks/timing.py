@@ -6,6 +6,7 @@ import multiprocessing
 import resource
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple, TypeVar
 
 Job = TypeVar("Job")
@@ -38,5 +39,6 @@ def time_runs(run: Callable[[], object], least_seconds: float = 2.0, least_runs:
 
 def in_own_process(measure: Callable[[Job], Result], job: Job) -> Result:
     """Call `measure(job)` in a fresh process."""
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        return pool.apply(measure, (job,))
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, mp_context=context) as pool:  # which may start processes itself
+        return pool.submit(measure, job).result()

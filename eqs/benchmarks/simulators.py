@@ -16,8 +16,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.timing import Cost, in_own_process, time_runs
 from eqs import simulators
+from eqs.benchmarks.timing import Cost, in_own_process, time_runs
 from eqs.frames import FrameFolder, image_paths
 
 NAMES = tuple(

@@ -15,9 +15,9 @@ from rich.console import Console
 from rich.table import Table
 from torch import Tensor
 
-from benchmarks import plain_rvt
-from benchmarks.simulators import PERIOD_US, draw_clip
-from benchmarks.timing import Cost, in_own_process, time_runs
+from eqs.benchmarks import plain_rvt
+from eqs.benchmarks.simulators import PERIOD_US, draw_clip
+from eqs.benchmarks.timing import Cost, in_own_process, time_runs
 from eqs.events import EventReader, Events
 from eqs.models import RVTDetector
 from eqs.models.loss import detection_loss

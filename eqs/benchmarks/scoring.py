@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from torch import Tensor
 
-from benchmarks.timing import Cost, in_own_process, time_runs
+from eqs.benchmarks.timing import Cost, in_own_process, time_runs
 from eqs.events import Events
 from eqs.metrics import Definition, Judge, Reading, group_chunks, score_streams
 from eqs.metrics.windows import chunk_length
