@@ -74,7 +74,7 @@ def single_downloads(tree, root):
         "images/timestamps.txt": "image_timestamps.txt",
         "images/left/exposure_timestamps.txt": "image_exposure_timestamps_left.txt",
     }
-    root.mkdir()
+    root.mkdir(parents=True)
     for sequence in sorted(tree.glob("*/*")):
         for place, name in places.items():
             source, target = sequence / place, root / f"{sequence.name}_{name}"

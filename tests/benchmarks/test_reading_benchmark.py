@@ -10,7 +10,7 @@ from eqs.events import EventReader
 @pytest.fixture
 def job(tmp_path, monkeypatch):
     monkeypatch.setattr(reading, "PER_WINDOW", 2_000)
-    monkeypatch.setattr(reading, "SECONDS", 0.2)
+    monkeypatch.setattr(reading, "BATCHES", 3)
     draw(tmp_path / "events.h5", 12, 64, 48)
     return Job(
         events=tmp_path / "events.h5", size=(64, 48), windows=12, cache=tmp_path / "kept", workers=0
