@@ -54,7 +54,8 @@ class GivenEvents:
         nested = folder / recording.name / EVENTS
         found = [nested] if nested.is_file() else []
         if folder.is_dir():
-            found += [p for p in folder.iterdir() if p.is_file() and p.stem == recording.name]
+            files = [path for path in folder.iterdir() if path.is_file()]
+            found += [path for path in files if path.stem == recording.name]
         if not found:
             raise FileNotFoundError(
                 f"Expected {recording.name} with any ending in {folder}, found none; set "
@@ -85,16 +86,18 @@ class GivenStreams:
 
     @property
     def name(self) -> str:
-        """The simulator's name."""
-        return self.given.name
+        """The simulator's name, marked as one that did not run here."""
+        return f"{self.given.name} (given)"
 
     @cached_property
     def label(self) -> str:
-        """Name and a hash of what the files hold."""
+        """Name and a hash of what the files hold, hidden ones left out."""
         folder = Path(self.given.folder)
-        files = sorted(path for path in folder.rglob("*") if path.is_file())
-        names = [path.relative_to(folder).as_posix() for path in files]
-        return f"{self.name}-{short_hash(['given', names, content_hashes(files)])}"
+        files = [path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file()]
+        files = [path for path in files if not any(part.startswith(".") for part in path.parts)]
+        names = [path.as_posix() for path in files]
+        content = content_hashes(folder / path for path in files)
+        return f"{self.given.name}-{short_hash(['given', names, content])}"
 
     def path(self, recording: Recording) -> Path:
         """Where the recording's events lie, in DSEC layout."""

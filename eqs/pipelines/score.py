@@ -25,6 +25,7 @@ from eqs.pipelines.scoring import Scoring
 
 # Anchors and baselines hold events in memory: a long recording lends its first quarter minute.
 ANCHOR_US = 15_000_000
+READ_AT_ONCE_US = 1_000_000
 
 
 @dataclass
@@ -71,7 +72,13 @@ def score_recordings(
             streams = {name: opened(recording, s.path(recording)) for name, s in systems.items()}
             unrelated = opened(other, other.events_path) if other is not None else None
             try:
-                score_recording(scoring, recording, real, streams, unrelated, scores)
+                window_us = scoring.headline.definition.window_us
+                scene = Scene(
+                    name=recording.name,
+                    grid=recording_grid(recording, real, window_us),
+                    frame_times_us=recording.frame_times_us,
+                )
+                score_scene(scoring, scene, real, streams, unrelated, scores)
             except ValueError as error:
                 raise ValueError(f"{recording.name}: {error}") from error
     return scores
@@ -94,26 +101,40 @@ def partner(
     return next((other for other in others if size(other) == size(recording)), None)
 
 
-def score_recording(
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """What was recorded once and is scored for several systems.
+
+    Args:
+        name: the recording's name.
+        grid: the windows that are compared.
+        frame_times_us: times of the frames, where there are any.
+    """
+
+    name: str
+    grid: Grid
+    frame_times_us: NDArray[np.int64] | None = None
+
+
+def score_scene(
     scoring: Scoring,
-    recording: Recording,
-    real: EventReader,
-    streams: Mapping[str, EventReader],
-    other: EventReader | None,
+    scene: Scene,
+    real: EventReader | LoadedEvents,
+    streams: Mapping[str, EventReader | LoadedEvents],
+    other: EventReader | LoadedEvents | None,
     scores: Scores,
 ) -> None:
     """Add the scores of one recording; `other`, of the same size, lends the chance level."""
-    grid = recording_grid(recording, real, scoring.headline.definition.window_us)
-    start, stop = grid.start_us, grid.stop_us
+    start, stop = scene.grid.start_us, scene.grid.stop_us
     candidates = list(streams.values())
     frechet = FeatureFrechet(scoring.headline.definition.tap)
     found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
     untrained = untrained_scores(scoring, real, candidates, start, stop)
-    frames = recording.frame_times_us
+    frames = scene.frame_times_us
     known = score_anchors(
-        scoring, real, start, stop, other=other, frame_times_us=frames, key=recording.name
+        scoring, real, start, stop, other=other, frame_times_us=frames, key=scene.name
     )
-    shared = shared_columns(scoring, recording, real, grid, known)
+    shared = shared_columns(scoring, scene, real, known)
     for (name, stream), by_reading, without, distance in zip(
         streams.items(), found, untrained, frechet.values(), strict=True
     ):
@@ -130,32 +151,39 @@ def score_recording(
                 f"{BASELINE}untrained_eqs": without,
                 f"{BASELINE}frechet_distance": distance,
                 "n_windows": headline.n_windows,
-                "n_events_sim": len(stream.window(start, stop)),
+                "n_events_sim": count_events(stream, start, stop),
             }
         )
     scores.anchors += [
-        {"sequence": recording.name, "anchor": name, **values} for name, values in known.items()
+        {"sequence": scene.name, "anchor": name, **values} for name, values in known.items()
     ]
 
 
 def shared_columns(
     scoring: Scoring,
-    recording: Recording,
-    real: EventReader,
-    grid: Grid,
+    scene: Scene,
+    real: EventReader | LoadedEvents,
     known: Mapping[str, Mapping[str, float]],
 ) -> dict[str, Any]:
     """The columns of `eqs.csv` that are the same for every system."""
     return {
-        "sequence": recording.name,
+        "sequence": scene.name,
         "eqs_chance": known.get("chance", {}).get(scoring.headline.name, np.nan),
         "eqs_ceiling": known["ceiling"][scoring.headline.name],
-        "start_us": grid.start_us,
-        "stop_us": grid.stop_us,
-        "n_events_real": len(real.window(grid.start_us, grid.stop_us)),
+        "start_us": scene.grid.start_us,
+        "stop_us": scene.grid.stop_us,
+        "n_events_real": count_events(real, scene.grid.start_us, scene.grid.stop_us),
         "definition": scoring.headline.definition.hash,
         "weights_sha256": scoring.judge.weights_sha256,
     }
+
+
+def count_events(stream: EventReader | LoadedEvents, start_us: int, stop_us: int) -> int:
+    """The events of a stretch of time, of which a second at a time is in memory."""
+    return sum(
+        len(stream.window(at, min(at + READ_AT_ONCE_US, stop_us)))
+        for at in range(start_us, stop_us, READ_AT_ONCE_US)
+    )
 
 
 def recording_grid(recording: Recording, real: EventReader, window_us: int) -> Grid:
@@ -179,8 +207,8 @@ def recording_grid(recording: Recording, real: EventReader, window_us: int) -> G
 
 def untrained_scores(
     scoring: Scoring,
-    real: EventReader,
-    candidates: Sequence[EventReader],
+    real: EventReader | LoadedEvents,
+    candidates: Sequence[EventReader | LoadedEvents],
     start_us: int,
     stop_us: int,
 ) -> list[float]:
@@ -197,11 +225,11 @@ def untrained_scores(
 
 def score_baselines(
     scoring: Scoring,
-    stream: EventReader,
-    real: EventReader,
+    stream: EventReader | LoadedEvents,
+    real: EventReader | LoadedEvents,
     start_us: int,
     stop_us: int,
-    frame_times_us: NDArray[np.int64],
+    frame_times_us: NDArray[np.int64] | None,
 ) -> dict[str, float]:
     """What the cheap rivals say of a stream, by column of `eqs.csv`."""
     stop_us = min(stop_us, start_us + ANCHOR_US)
@@ -216,7 +244,7 @@ def score_baselines(
     return {f"{BASELINE}{name}": value for name, value in found.items()}
 
 
-def first_events(reader: EventReader) -> Events:
+def first_events(reader: EventReader | LoadedEvents) -> Events:
     """The first quarter minute of a recording's events."""
     return reader.window(reader.start_us, reader.start_us + ANCHOR_US)
 
@@ -227,7 +255,7 @@ def score_anchors(
     start_us: int,
     stop_us: int,
     *,
-    other: EventReader | None = None,
+    other: EventReader | LoadedEvents | None = None,
     frame_times_us: NDArray[np.int64] | None = None,
     key: str = "",
 ) -> dict[str, dict[str, float]]:

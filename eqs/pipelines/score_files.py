@@ -20,7 +20,8 @@ from eqs.metrics import StreamScore
 from eqs.metrics.grid import Grid, fewest_windows
 from eqs.metrics.windows import common_grid
 from eqs.pipelines.command import explained
-from eqs.pipelines.score import score_anchors
+from eqs.pipelines.score import count_events, score_anchors
+from eqs.pipelines.score_folders import score_folders
 from eqs.pipelines.scoring import Scoring, find_scoring
 
 log = logging.getLogger(__name__)
@@ -60,6 +61,8 @@ class Pair:
 def score_files(cfg: DictConfig) -> None:
     """Score `cfg.simulated` against `cfg.real`, print it, and write map and curve to `cfg.out`.
 
+    Two folders are scored recording by recording, see `score_folders`.
+
     Raises:
         FileNotFoundError: a file is missing.
         ValueError: there is no judge, the streams share no whole window or no sensor size, or the
@@ -67,7 +70,16 @@ def score_files(cfg: DictConfig) -> None:
     """
     out = Path(cfg.out)
     refuse_others(out)
+    folders = [Path(path).is_dir() for path in (cfg.simulated, cfg.real)]
+    if any(folders) and not all(folders):
+        raise ValueError(
+            f"Expected two files or two folders, got one of each: {cfg.simulated} and {cfg.real}; "
+            "give two of a kind"
+        )
     scoring = find_scoring(cfg, None)
+    if all(folders):
+        score_folders(cfg, scoring)
+        return
     pair = compare(cfg, scoring)
     result, window_us = pair.scores[scoring.headline.name], pair.grid.window_us
     files = {"simulated": str(cfg.simulated), "real": str(cfg.real)}
@@ -101,7 +113,7 @@ def compare(cfg: DictConfig, scoring: Scoring) -> Pair:
             grid=grid,
             scores=scores,
             anchors=score_anchors(scoring, real, *span),
-            events={name: len(each.window(*span)) for name, each in files.items()},
+            events={name: count_events(each, *span) for name, each in files.items()},
             watched_us=simulated.span_us,
             size=(real.height, real.width),
         )
@@ -182,7 +194,10 @@ def refuse_others(out: Path) -> None:
     Raises:
         ValueError: there are some, and no record of this command beside them.
     """
-    names = ("score.json", "curve.csv", "map.png", "map.svg", "curve.png", "curve.svg")
+    names = (
+        "score.json", "curve.csv", "map.png", "map.svg", "curve.png", "curve.svg", "eqs.csv",
+        "anchors.csv", "report.html",
+    )  # fmt: skip
     there = [name for name in names if (out / name).exists()]
     record = out / "score.json"
     ours = record.is_file() and {"eqs", "definition"} <= read_json(record).keys()

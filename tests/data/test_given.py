@@ -45,7 +45,7 @@ def test_a_given_stream_is_what_the_same_events_are_here(tmp_path, recording):
     for name in "txyp":
         assert getattr(found, name).tolist() == getattr(events, name).tolist()
     assert found.span_us == events.span_us  # so windows and scores are the same
-    assert mine.name == "mine"
+    assert mine.name == "mine (given)"
     assert mine.label.startswith("mine-")
 
 

@@ -11,10 +11,9 @@ from hydra import compose, initialize_config_dir
 from eqs.data import Recording
 from eqs.data.simulated import write_stream
 from eqs.events import EventReader
-from eqs.frames import FrameFolder
 from eqs.pipelines.calibrate import Clip
 from eqs.pipelines.sanity import damaged_scores
-from eqs.pipelines.score import Scores, recording_grid, score_recording
+from eqs.pipelines.score import Scene, Scores, recording_grid, score_scene
 from eqs.pipelines.score_files import score_files
 from eqs.pipelines.scoring import find_scoring
 from eqs.simulators import V2E
@@ -62,8 +61,7 @@ def recorded(folder, make_events):
 def simulated(folder, make_events):
     """What a simulator wrote from the frames, with all events but late ones taken out."""
     recording, path = Recording.load(folder), folder.parent / "simulated.h5"
-    frames = FrameFolder(recording.frame_folder, recording.frame_times_us)
-    write_stream(V2E(), "a", frames, path)
+    write_stream(V2E(), "a", recording.frames(), path)
     with EventReader(path) as reader:
         late = replace(reader.window(1_500_000, LAST), span_us=reader.span_us)
     assert len(late)
@@ -79,7 +77,9 @@ def test_a_study_and_two_files_give_one_number(real, recorded, simulated, tmp_pa
     files = json.loads((tmp_path / "score.json").read_text())
     scoring, scores = find_scoring(cfg, None), Scores()
     with EventReader(recording.events_path) as truth, EventReader(simulated) as stream:
-        score_recording(scoring, recording, truth, {"v2e": stream}, None, scores)
+        grid = recording_grid(recording, truth, scoring.headline.definition.window_us)
+        scene = Scene(name="a", grid=grid, frame_times_us=recording.frame_times_us)
+        score_scene(scoring, scene, truth, {"v2e": stream}, None, scores)
     (row,) = scores.rows
     assert files["definition"] == row["definition"]
     assert files["span_us"] == [row["start_us"], row["stop_us"]]

@@ -21,7 +21,7 @@ def baselines(
     *,
     start_us: int,
     stop_us: int,
-    frame_times_us: NDArray[np.int64],
+    frame_times_us: NDArray[np.int64] | None,
 ) -> dict[str, float]:
     """Every baseline by its name, over the windows that the score itself looks at.
 
@@ -31,7 +31,8 @@ def baselines(
         definition: windows, bins and cutoff.
         start_us: start of the first window.
         stop_us: time that no window may pass.
-        frame_times_us: times of the video frames, rising, at least two.
+        frame_times_us: times of the video frames, rising, at least two; None where there are none,
+            which leaves out what asks for their beat.
 
     Raises:
         ValueError: the sensors differ, or no whole window fits.
@@ -41,12 +42,15 @@ def baselines(
     first, last = int(starts[0]), int(starts[-1]) + definition.window_us
     simulated, real = simulated.window(first, last), real.window(first, last)
     window = definition.window_us
+    beats = {}
+    if frame_times_us is not None:
+        beats["phase_locking_error"] = phase_locking_error(simulated, real, frame_times_us)
     return {
         "log_rate_error": log_rate_error(simulated, real),
         "polarity_error": polarity_error(simulated, real),
         "rate_map_correlation": rate_map_correlation(simulated, real),
         "interval_distance": interval_distance(simulated, real),
-        "phase_locking_error": phase_locking_error(simulated, real, frame_times_us),
+        **beats,
         **tensor_baselines(
             histogram_chunks([simulated, real], starts, definition), definition.count_cutoff
         ),
