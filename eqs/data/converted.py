@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from eqs.content import content_hash
+from eqs.events import Events
 from eqs.events.formats import decode, is_dsec
 from eqs.files import one_at_a_time, short_hash
 
@@ -41,12 +42,23 @@ def converted(
     """
     if is_dsec(path):
         return path
-    tables = tables or Tables()
-    read_as = short_hash([height, width, asdict(tables)])
+    read_as = short_hash([height, width, asdict(tables or Tables())])
     kept = Path(folder) / f"{path.stem}-{content_hash(path)}-{read_as}.h5"
     if not kept.exists():
         with one_at_a_time(kept, f"converting {path}"):
             if not kept.exists():  # another process was at it
-                found = decode(path, tables.order, tables.time_unit)
-                found.events(height, width).save(kept)
+                read(path, height, width, tables).save(kept)
     return kept
+
+
+def read(path: Path, height: int, width: int, tables: Tables | None = None) -> Events:
+    """The events of a file of any kind.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file cannot be read, or is of another sensor.
+    """
+    if is_dsec(path):
+        return Events.load(path, height, width)
+    tables = tables or Tables()
+    return decode(path, tables.order, tables.time_unit).events(height, width)

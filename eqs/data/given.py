@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from rich.progress import track
 
 from eqs.content import content_hash, content_hashes
+from eqs.data.converted import Tables, read
 from eqs.data.places import EVENTS
 from eqs.data.recording import Recording
-from eqs.events import Events
 from eqs.files import one_at_a_time, read_json, short_hash, write_json
 
 log = logging.getLogger(__name__)
@@ -27,6 +27,9 @@ class GivenEvents:
     Args:
         folder: holds `<recording>.<any ending>` or `<recording>/events/left/events.h5`.
         name: name of the simulator.
+        from_first_frame: whether times count from each recording's first frame, and not on its
+            clock.
+        tables: how to read tables of numbers.
 
     Raises:
         ValueError: the name is taken, or none.
@@ -34,6 +37,8 @@ class GivenEvents:
 
     folder: Path | str
     name: str
+    from_first_frame: bool = False
+    tables: Tables | None = None
 
     def __post_init__(self) -> None:
         """Check the name."""
@@ -97,7 +102,8 @@ class GivenStreams:
         files = [path for path in files if not any(part.startswith(".") for part in path.parts)]
         names = [path.as_posix() for path in files]
         content = content_hashes(folder / path for path in files)
-        return f"{self.given.name}-{short_hash(['given', names, content])}"
+        read_as = [self.given.from_first_frame, self.given.tables and asdict(self.given.tables)]
+        return f"{self.given.name}-{short_hash(['given', names, content, read_as])}"
 
     def path(self, recording: Recording) -> Path:
         """Where the recording's events lie, in DSEC layout."""
@@ -133,8 +139,10 @@ class GivenStreams:
 
     def _convert(self, recording: Recording) -> None:
         source = self.given.file(recording)
-        events = Events.load(source, recording.height, recording.width)
+        events = read(source, recording.height, recording.width, self.given.tables)
         first, last = (int(time) for time in recording.frame_times_us[[0, -1]])
+        if self.given.from_first_frame:
+            events = events.shifted(first)
         extent = events.extent_us
         if extent is None:
             raise ValueError(
@@ -144,7 +152,8 @@ class GivenStreams:
         if not shared:
             raise ValueError(
                 f"Expected events on the clock of the frames, {first} to {last} us, in {source}, "
-                f"got {extent[0]} to {extent[1]} us; shift them"
+                f"got {extent[0]} to {extent[1]} us; shift them or, where they count from the "
+                "first frame, set sim.from_first_frame=true"
             )
         if shared < COVERED:
             log.warning("%s covers %.0f %% of its frames' time", source, 100 * shared)

@@ -76,8 +76,15 @@ def test_what_does_not_fit_is_named(tmp_path, recording, make_events):
     with pytest.raises(FileNotFoundError, match=r"Expected street with any ending in .*sim.folder"):
         mine.prepare([recording])
     make_events(200, stop_us=200_000).save(folder / "street.h5")
-    with pytest.raises(ValueError, match=r"clock of the frames, 1000000 to 1200000 us, .*shift"):
+    with pytest.raises(
+        ValueError, match=r"clock of the frames, 1000000 to 1200000 us, .*from_first_frame"
+    ):
         mine.prepare([recording])
+    counted = GivenStreams(replace(mine.given, from_first_frame=True), tmp_path / "simulated")
+    counted.prepare([recording])
+    with EventReader(counted.path(recording)) as reader:
+        assert 1_000_000 <= reader.start_us < reader.stop_us <= 1_200_001
+    assert counted.label != mine.label
     make_events(200, height=9, width=9).save(folder / "street.h5")
     with pytest.raises(ValueError, match="sensor with height 24, got 9"):
         mine.prepare([recording])
