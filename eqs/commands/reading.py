@@ -16,6 +16,9 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--width", type=int, help="columns, where the file does not say")
     parser.add_argument("--order", help="order of a table's columns, for instance txyp")
     parser.add_argument("--time-unit", choices=[*UNITS_US], help="unit of a table's times")
+    parser.add_argument(
+        "--first-pixel", type=int, choices=(0, 1), help="first column and row of a MATLAB file"
+    )
 
 
 def read(path: Path, given: argparse.Namespace) -> tuple[str, int, int, Events]:
@@ -27,5 +30,5 @@ def read(path: Path, given: argparse.Namespace) -> tuple[str, int, int, Events]:
     """
     if is_dsec(path):
         return "HDF5 in the layout of DSEC", 0, 0, Events.load(path, given.height, given.width)
-    found = decode(path, given.order, given.time_unit)
+    found = decode(path, given.order, given.time_unit, given.first_pixel)
     return found.kind, found.disorder, found.dropped, found.events(given.height, given.width)

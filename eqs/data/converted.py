@@ -18,10 +18,12 @@ class Tables:
     Args:
         order: order of the columns, for instance `txyp`.
         time_unit: unit of whole-numbered times: s, ms, us or ns.
+        first_pixel: number of the first column and row in a MATLAB file, 0 or 1.
     """
 
     order: str | None = None
     time_unit: str | None = None
+    first_pixel: int | None = None
 
 
 def converted(
@@ -61,4 +63,5 @@ def read(path: Path, height: int, width: int, tables: Tables | None = None) -> E
     if is_dsec(path):
         return Events.load(path, height, width)
     tables = tables or Tables()
-    return decode(path, tables.order, tables.time_unit).events(height, width)
+    found = decode(path, tables.order, tables.time_unit, tables.first_pixel)
+    return found.events(height, width)

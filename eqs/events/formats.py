@@ -10,6 +10,7 @@ from eqs.events.aedat import read_aedat2, read_aedat3, read_aedat4
 from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
 from eqs.events.decoded import Decoded
 from eqs.events.loaded import LoadedEvents
+from eqs.events.matlab import read_matlab
 from eqs.events.raw import read_prophesee
 from eqs.events.reader import EventReader
 from eqs.events.ros import read_bag
@@ -17,7 +18,7 @@ from eqs.events.tables import read_foreign_hdf5, read_numpy, read_text
 
 READ = (
     "DSEC, v2e, event_utils, MVSEC, M3ED and Metavision HDF5, RAW (EVT2, EVT2.1, EVT3), DAT, "
-    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, npy, npz, text and CSV"
+    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, MATLAB, npy, npz, text and CSV"
 )
 
 
@@ -53,13 +54,19 @@ def is_dsec(path: Path) -> bool:
         return True  # whose reader says what is wrong
 
 
-def decode(path: Path | str, order: str | None = None, time_unit: str | None = None) -> Decoded:
+def decode(
+    path: Path | str,
+    order: str | None = None,
+    time_unit: str | None = None,
+    first_pixel: int | None = None,
+) -> Decoded:
     """The events of a file that is not in the layout of DSEC.
 
     Args:
         path: the file.
         order: order of the columns of a table without names, for instance `txyp`.
         time_unit: unit of a table's times, where they are whole numbers: s, ms, us or ns.
+        first_pixel: number of the first column and row in a MATLAB file, 0 or 1.
 
     Raises:
         FileNotFoundError: there is no such file.
@@ -80,8 +87,8 @@ def decode(path: Path | str, order: str | None = None, time_unit: str | None = N
             return read(path)
     if first[:6] == b"\x93NUMPY" or (first[:4] == b"PK\x03\x04" and path.suffix == ".npz"):
         return read_numpy(path, order, time_unit)
-    if first.startswith(b"MATLAB 5"):
-        raise ValueError(f"Expected {READ} in {path}, got a MATLAB file; save it as npz or CSV")
+    if first.startswith(b"MATLAB"):
+        return read_matlab(path, order, time_unit, first_pixel)
     if path.suffix == ".bin":
         return read_forty_bits(path)
     if path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv", ".dat"):

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.events.caer import compressed_caer
 from eqs.events.decoded import Decoded, unwrapped
 from eqs.events.raw import evt3
 from eqs.extras import needed
@@ -100,7 +101,7 @@ def read_bag(path: Path) -> Decoded:
 def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Decoded:
     """Events of packets: a camera's own encoding, or `mono`."""
     parts: list[bytes] = []
-    bases: list[NDArray[np.int64]] = []
+    bases: list[int] = []
     height = width = 0
     encoding = ""
     for raw in messages:
@@ -110,14 +111,15 @@ def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Decoded:
         base_ns, encoding = message.number(8), message.text()
         message.number(1)
         parts.append(message.bytes())
-        bases.append(np.full(len(parts[-1]) // 8, base_ns, np.int64))
+        bases.append(base_ns)
     content = b"".join(parts)
     dropped = 0
     if encoding == "evt3":
         t, x, y, p, dropped = evt3(np.frombuffer(content[: len(content) // 2 * 2], "<u2"))
     elif encoding == "mono":
         words = np.frombuffer(content[: len(content) // 8 * 8], "<u8")
-        t = (np.concatenate(bases) + (words & np.uint64(0xFFFFFFFF)).astype(np.int64)) // 1000
+        begun = np.repeat(np.array(bases, np.int64), [len(part) // 8 for part in parts])
+        t = (begun + (words & np.uint64(0xFFFFFFFF)).astype(np.int64)) // 1000
         place = (words >> np.uint64(32)).astype(np.int64)
         x, y, p = place & 0x7FFF, place >> 16 & 0x7FFF, place >> 31
     elif encoding == "libcaer":
@@ -125,9 +127,12 @@ def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Decoded:
         pairs = pairs[pairs[:, 0] & 1 == 1].astype(np.int64)  # the others were marked as none
         t = unwrapped(pairs[:, 1], 1 << 31)
         x, y, p = pairs[:, 0] >> 17, pairs[:, 0] >> 2 & 0x7FFF, pairs[:, 0] >> 1 & 1
+    elif encoding == "libcaer_cmp":
+        t, x, y, p, dropped = compressed_caer(parts, bases)
     else:
         raise ValueError(
-            f"Expected packets of evt3, mono or libcaer in {path}, got {encoding or 'none'}; "
+            f"Expected packets of evt3, mono, libcaer or libcaer_cmp in {path}, got "
+            f"{encoding or 'none'}; "
             "convert them with event_camera_tools"
         )
     return Decoded(

@@ -96,9 +96,26 @@ def test_words_of_evt3_go_on_from_packet_to_packet():
     assert rows(packets(iter(messages), Path("a"), ros1=False)) == [(4098, 5, 7, 1)]
 
 
+@pytest.mark.parametrize("ros1", [True, False])
+def test_compressed_packets_begin_their_times_anew(ros1):
+    """Words: 0 and 1 times, 2 column, 3 event, 4 base, 5 eight rows above it, which move it on."""
+    first = [0 << 12 | 1, 1 << 12 | 5, 2 << 12 | 9, 3 << 12 | 1 << 11 | 4]
+    first += [4 << 12 | 1 << 11 | 16, 5 << 12 | 0b101, 5 << 12 | 0b10]
+    second = [3 << 12 | 7, 1 << 12 | 2, 3 << 12 | 8]
+    messages = [
+        packet(b"libcaer_cmp", np.array(words, "<u2").tobytes(), ros1) for words in (first, second)
+    ]
+    found = packets(iter(messages), Path("a"), ros1=ros1)
+    base = found.t.min()
+    assert {(t - base, x, y, p) for t, x, y, p in rows(found)} == {
+        (4101, 9, 4, 1), (4101, 9, 16, 1), (4101, 9, 18, 1), (4101, 9, 25, 1),
+        (0, 9, 7, 0), (2, 9, 8, 0),
+    }  # fmt: skip
+
+
 def test_encodings_that_are_not_read_are_named():
-    message = packet(b"libcaer_cmp", b"1234", False)
-    with pytest.raises(ValueError, match=r"evt3, mono or libcaer in a, got libcaer_cmp; convert"):
+    message = packet(b"evt4", b"1234", False)
+    with pytest.raises(ValueError, match=r"libcaer or libcaer_cmp in a, got evt4; convert"):
         packets(iter([message]), Path("a"), ros1=False)
     with pytest.raises(ValueError, match="got one that was cut off"):
         packets(iter([message[:20]]), Path("a"), ros1=False)
