@@ -7,7 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from eqs.commands.reading import add_reading, read
+from eqs.commands.reading import add_reading, opened
+from eqs.events import EventWriter
 
 
 def main(arguments: Sequence[str], shown: str) -> None:
@@ -20,9 +21,14 @@ def main(arguments: Sequence[str], shown: str) -> None:
     try:
         if given.out.exists():
             raise ValueError(f"Expected no file at {given.out}, got one; name another place")
-        kind, disorder, _, events = read(given.file, given)
-        events.save(given.out)
+        pieces = opened(given.file, given)
+        count = 0
+        with EventWriter(given.out, pieces.height, pieces.width) as writer:
+            for events in pieces:
+                writer.append(events)
+                count += len(events)
+            writer.span_us = pieces.span_us
     except (OSError, ValueError) as error:
         sys.exit(str(error))
-    sorted_in = f", {disorder} of them put in order" if disorder else ""
-    sys.stdout.write(f"{given.out}: {len(events):,} events of {kind}{sorted_in}\n")
+    sorted_in = f", {pieces.disorder} of them put in order" if pieces.disorder else ""
+    sys.stdout.write(f"{given.out}: {count:,} events of {pieces.kind}{sorted_in}\n")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from eqs.events import Events
-from eqs.events.formats import decode, is_dsec
+from eqs.events.pieces import EventPieces, ReadAs
 from eqs.events.tables import UNITS_US
 
 
@@ -21,14 +20,12 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read(path: Path, given: argparse.Namespace) -> tuple[str, int, int, Events]:
-    """What a file is, how many of its events were out of order or dropped, and the stream.
+def opened(path: Path, given: argparse.Namespace) -> EventPieces:
+    """The file, to be read piece by piece.
 
     Raises:
         FileNotFoundError: there is no such file.
         ValueError: it is of no known kind, damaged, or fits several readings.
     """
-    if is_dsec(path):
-        return "HDF5 in the layout of DSEC", 0, 0, Events.load(path, given.height, given.width)
-    found = decode(path, given.order, given.time_unit, given.first_pixel)
-    return found.kind, found.disorder, found.dropped, found.events(given.height, given.width)
+    names = ("height", "width", "order", "time_unit", "first_pixel")
+    return EventPieces(path, ReadAs(**{name: getattr(given, name) for name in names}))

@@ -6,8 +6,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from eqs.content import content_hash
-from eqs.events import Events
+from eqs.events import Events, EventWriter
 from eqs.events.formats import decode, is_dsec
+from eqs.events.pieces import EventPieces, ReadAs
 from eqs.files import one_at_a_time, short_hash
 
 
@@ -49,8 +50,16 @@ def converted(
     if not kept.exists():
         with one_at_a_time(kept, f"converting {path}"):
             if not kept.exists():  # another process was at it
-                read(path, height, width, tables).save(kept)
+                _convert(path, kept, height, width, tables or Tables())
     return kept
+
+
+def _convert(path: Path, kept: Path, height: int, width: int, tables: Tables) -> None:
+    pieces = EventPieces(path, ReadAs(height=height, width=width, **asdict(tables)))
+    with EventWriter(kept, height, width) as writer:
+        for events in pieces:
+            writer.append(events)
+        writer.span_us = pieces.span_us
 
 
 def read(path: Path, height: int, width: int, tables: Tables | None = None) -> Events:

@@ -79,7 +79,9 @@ def read_aedat3(path: Path) -> Decoded:
     overflows: list[NDArray[np.int64]] = []
     while at + PACKET_HEADER <= len(content):
         kind = int.from_bytes(content[at : at + 2], "little")
-        size, _, overflow, _, number, _ = np.frombuffer(content[at + 4 : at + PACKET_HEADER], "<i4")
+        size, _, overflow, _, number, _ = (
+            int(each) for each in np.frombuffer(content[at + 4 : at + PACKET_HEADER], "<i4")
+        )
         at += PACKET_HEADER
         if size < 1 or number < 0 or at + size * number > len(content):
             break  # a packet that was cut off

@@ -38,17 +38,24 @@ class Decoded:
     @property
     def disorder(self) -> int:
         """Events that come after a later one."""
-        return int((self.t < np.maximum.accumulate(self.t)).sum()) if len(self.t) else 0
+        return self.disorder_after(np.iinfo(np.int64).min)
 
-    def events(self, height: int | None = None, width: int | None = None) -> Events:
-        """The stream, sorted by time; equal times keep the file's order.
+    def disorder_after(self, newest_us: int) -> int:
+        """Events that come after a later one, where one of that time came before these."""
+        if not len(self.t):
+            return 0
+        latest = np.maximum(np.maximum.accumulate(self.t), newest_us)
+        return int((self.t < latest).sum())
+
+    def size(self, height: int | None = None, width: int | None = None) -> tuple[int, int]:
+        """Height and width of the sensor.
 
         Args:
             height: rows of the sensor, where the file does not say.
             width: columns of the sensor, where the file does not say.
 
         Raises:
-            ValueError: nobody says the size, the file says another, or an event is outside of it.
+            ValueError: nobody says the size, or the file says another.
         """
         size: list[int] = []
         for name, stored, given in (
@@ -65,11 +72,24 @@ class Decoded:
                     f"{name} out"
                 )
             size.append(int(stored if stored is not None else given or 0))
+        return size[0], size[1]
+
+    def events(self, height: int | None = None, width: int | None = None) -> Events:
+        """The stream, sorted by time; equal times keep the file's order.
+
+        Args:
+            height: rows of the sensor, where the file does not say.
+            width: columns of the sensor, where the file does not say.
+
+        Raises:
+            ValueError: nobody says the size, the file says another, or an event is outside of it.
+        """
+        height, width = self.size(height, width)
         fields = {name: getattr(self, name) for name in "txyp"}
         if self.disorder:
             order = np.argsort(self.t, kind="stable")
             fields = {name: values[order] for name, values in fields.items()}
-        return Events.from_arrays(**fields, height=size[0], width=size[1])
+        return Events.from_arrays(**fields, height=height, width=width)
 
 
 def unwrapped(times: NDArray[np.int64], period: int) -> NDArray[np.int64]:

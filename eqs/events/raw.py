@@ -6,9 +6,10 @@ Source: the published descriptions of the encodings; every word is little-endian
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from eqs.events.decoded import Decoded, last_before, unwrapped
 
 LONGEST_HEADER = 1 << 20
+PIECE_BYTES = 1 << 19
 # Sensors by the name of the camera's plugin, where a header does not state the size.
 PLUGINS = {"gen41": (720, 1280), "imx636": (720, 1280), "gen3": (480, 640), "genx320": (320, 320)}
 
@@ -24,10 +26,34 @@ def read_prophesee(path: Path) -> Decoded:
     """Events of a file that begins with lines of `%`.
 
     Raises:
-        ValueError: the header names no encoding that is read here, or data are cut off.
+        ValueError: the header names no encoding that is read here.
     """
-    content = path.read_bytes()
-    header, start = split_header(content)
+    pieces = raw_pieces(path)
+    if pieces is None:
+        content = path.read_bytes()
+        header, start = split_header(content)
+        text = "\n".join(header)
+        return _dat(content, start, text, *size_of(text))
+    parts = list(pieces)
+    t, x, y, p = (np.concatenate([getattr(part, name) for part in parts]) for name in "txyp")
+    dropped = sum(part.dropped for part in parts)
+    return replace(parts[0], t=t, x=x, y=y, p=p, dropped=dropped)
+
+
+def raw_pieces(path: Path, at_once: int = PIECE_BYTES) -> Iterator[Decoded] | None:
+    """Events of a RAW file in its order, so many bytes at a time; None where it is no RAW file.
+
+    There is at least one piece, which may be empty; together they are what the whole file is,
+    however it is cut.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the header names no encoding that is read here.
+    """
+    with path.open("rb") as file:
+        header, start = split_header(file.read(LONGEST_HEADER))
+    if not header:
+        return None
     text = "\n".join(header)
     version = re.search(r"(?i)\bevt\s*(\d+(?:\.\d+)?)", text)
     height, width = size_of(text)
@@ -37,19 +63,38 @@ def read_prophesee(path: Path) -> Decoded:
                 f"Expected a header with the encoding (% evt 3.0) in {path}, got none; write it "
                 "again with its header"
             )
-        return _dat(content, start, text, height, width)
+        return None
     if version[1] not in ENCODINGS:
         raise ValueError(
             f"Expected EVT2, EVT2.1 or EVT3 in {path}, got EVT{version[1]}; convert it with "
             "Metavision's metavision_file_to_dat"
         )
-    kind, decode = ENCODINGS[version[1]]
-    whole = (len(content) - start) // kind.itemsize
-    t, x, y, p, dropped = decode(np.frombuffer(content, kind, whole, start))
-    return Decoded(
-        kind=f"a RAW file (EVT{version[1]})", t=t, x=x, y=y, p=p,
-        height=height, width=width, dropped=dropped,
-    )  # fmt: skip
+    kind = f"a RAW file (EVT{version[1]})"
+    encoding = ENCODINGS[version[1]]
+    parts = _cut(path, start, encoding, max(1, at_once // encoding.word.itemsize))
+    return (
+        Decoded(kind=kind, t=t, x=x, y=y, p=p, height=height, width=width, dropped=dropped)
+        for t, x, y, p, dropped in parts
+    )
+
+
+def _cut(path: Path, start: int, encoding: Encoding, words_at_once: int) -> Iterator[Arrays]:
+    """Decode so many words at a time, each time behind those that say where the last ones ended."""
+    before, turned_us = np.empty(0, encoding.word), 0
+    known = 0  # words behind which no event can stand yet, counted with their own piece
+    with path.open("rb") as file:
+        file.seek(start)
+        while True:
+            content = file.read(words_at_once * encoding.word.itemsize)
+            whole = len(content) // encoding.word.itemsize
+            words = np.concatenate([before, np.frombuffer(content, encoding.word, whole)])
+            t, x, y, p, dropped = encoding.decode(words)
+            yield t + turned_us, x, y, p, dropped - known
+            if whole < words_at_once:
+                return
+            before, further_us = encoding.context(words)
+            turned_us += further_us
+            known = encoding.decode(before)[4]
 
 
 def split_header(content: bytes) -> tuple[list[str], int]:
@@ -175,7 +220,52 @@ def _dat(content: bytes, start: int, text: str, height: int | None, width: int |
     return Decoded(kind="a DAT file", t=t, x=x, y=y, p=p, height=height, width=width)
 
 
-ENCODINGS: dict[str, tuple[np.dtype[Any], Callable[[NDArray[Any]], Arrays]]] = {
-    "2": (np.dtype("<u4"), evt2), "2.0": (np.dtype("<u4"), evt2), "2.1": (np.dtype("<u8"), evt21),
-    "3": (np.dtype("<u2"), evt3), "3.0": (np.dtype("<u2"), evt3),
-}  # fmt: skip
+def _turned(values: NDArray[Any], bits: int) -> int:
+    """How far the last of the times high has counted on past its bits."""
+    values = values.astype(np.int64)
+    return int(unwrapped(values, 1 << bits)[-1] - values[-1]) if len(values) else 0
+
+
+def _context2(words: NDArray[Any]) -> Context:
+    high = words[words >> 28 == 8]
+    return high[-1:], _turned(high & 0x0FFFFFFF, 28) << 6
+
+
+def _context21(words: NDArray[Any]) -> Context:
+    high = words[words >> np.uint64(60) == 8]
+    return high[-1:], _turned(high >> np.uint64(32) & np.uint64(0x0FFFFFFF), 28) << 6
+
+
+def _context3(words: NDArray[Any]) -> Context:
+    """The last row, base, time high and, where it is younger than that, time low.
+
+    Empty vectors behind the base move it on as far as it was.
+    """
+    kinds, value = words >> 12, (words & 0xFFF).astype(np.int64)
+    row, low, high, base = (np.flatnonzero(kinds == kind) for kind in (0, 6, 8, 3))
+    kept = [words[row[-1:]], words[base[-1:]]]
+    if len(base):
+        moved = words[base[-1] + 1 :]
+        kept.append(moved[(moved >> 12 == 4) | (moved >> 12 == 5)] & 0xF000)
+    kept.append(words[high[-1:]])
+    changed = _last_change(value, kinds == 8)[-1:]
+    if len(low) and len(high) and low[-1] > changed[0]:
+        kept.append(words[low[-1:]])
+    return np.concatenate(kept), _turned(value[high], 12) << 12
+
+
+Context = tuple[NDArray[Any], int]
+
+
+class Encoding(NamedTuple):
+    """An encoding of RAW files: its words, what they mean, and what of them the next ones need."""
+
+    word: np.dtype[Any]
+    decode: Callable[[NDArray[Any]], Arrays]
+    context: Callable[[NDArray[Any]], Context]
+
+
+EVT2 = Encoding(np.dtype("<u4"), evt2, _context2)
+EVT21 = Encoding(np.dtype("<u8"), evt21, _context21)
+EVT3 = Encoding(np.dtype("<u2"), evt3, _context3)
+ENCODINGS = {"2": EVT2, "2.0": EVT2, "2.1": EVT21, "3": EVT3, "3.0": EVT3}

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from eqs.commands.info import described, sketch
 from eqs.events import Events
 from eqs.events.formats import decode, is_dsec, open_events
 from eqs.events.loaded import LoadedEvents
@@ -281,12 +280,3 @@ def test_damaged_files_give_a_sentence_or_events(tmp_path_factory, data, name):
     path.write_bytes(bytes(content))
     with contextlib.suppress(ValueError):  # whose sentence says what is wrong
         assert len(Events.load(path, **SIZE)) <= 32 * len(content)
-
-
-def test_a_stream_is_described_in_words(events):
-    said = "\n".join(described("a file", 3, 2, events))
-    assert "sensor      64 x 48" in said
-    assert "events      500" in said
-    assert "disorder    3 events" in said
-    assert "dropped     2 events" in said
-    assert len(sketch(events).splitlines()) == 20
