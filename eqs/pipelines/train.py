@@ -15,7 +15,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
 
-from eqs.data import Dataset, EventSource, LabelProtocol, RecordedEvents
+from eqs.data import Dataset, EventSource, LabelProtocol, MixedEvents, RecordedEvents
 from eqs.files import one_at_a_time, short_hash
 from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
@@ -115,9 +115,7 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     cfg, run, source = job.cfg, job.run, job.source
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
     torch.set_num_threads(max(1, available_cores() // cfg.jobs))
-    tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
-    if isinstance(source, RecordedEvents):
-        del tests["own"]  # on the recorded events both tests are the same one
+    tests = test_streams(source)
     task = build_task(cfg, job.protocol, list(tests))
     checkpoint = checkpoint_path(cfg, run, job.shorter, job.identity, task.model)
     trainer = build_trainer(cfg, run, job.identity)
@@ -144,6 +142,14 @@ def execute(job: Job, times: PhaseTimes) -> bool:
         return False
     finish(job, trainer, task, seconds, times)
     return True
+
+
+def test_streams(source: EventSource) -> dict[str, EventSource]:
+    """The events to test on: those of the training, and the recorded ones where they differ."""
+    own = source.evaluation if isinstance(source, MixedEvents) else source
+    if isinstance(own, RecordedEvents):
+        return {"real": own}
+    return {"own": own, "real": RecordedEvents()}
 
 
 def finish(
