@@ -26,6 +26,7 @@ from eqs.pipelines.recipe import data_hash, recipe, recipe_hash, trials
 from eqs.pipelines.result import RunResult
 from eqs.pipelines.resume import check_checkpoint, checkpoint_path, identity_of, shorter_config
 from eqs.pipelines.runs import Run
+from eqs.pipelines.start import Start, start_of, trained_as
 from eqs.pipelines.timing import PhaseTimes, phase_times
 from eqs.pipelines.trainer import build_trainer, check_trainer, resumable
 from eqs.processors import available_cores
@@ -77,6 +78,7 @@ class Job:
         identity: what its checkpoints say of it.
         run: its folder.
         shorter: the training that it goes on from for longer, if it does.
+        start: the detector trained here whose weights it starts from, if it does.
     """
 
     cfg: DictConfig
@@ -86,6 +88,7 @@ class Job:
     identity: Mapping[str, Any]
     run: Run
     shorter: Run | None
+    start: Start | None
 
     @classmethod
     def of(
@@ -101,6 +104,7 @@ class Job:
             identity=identity_of(cfg, source.label, content),
             run=run_of(cfg, source, content),
             shorter=None if shorter is None else run_of(shorter, source, content),
+            start=start_of(cfg),
         )
 
 
@@ -163,14 +167,13 @@ def finish(
     trainer.save_checkpoint(job.run.weights, weights_only=True)
     if not trainer.is_global_zero:
         return
-    if isinstance(job.source, RecordedEvents):
+    if isinstance(job.source, RecordedEvents) and job.start is None:
         with times.measure("judge"):
             write_judge(job.cfg, job.run, job.data, trainer.strategy.root_device)
     real, card = task.measured["real"], job.protocol.card()
     job.run.finish(
         RunResult(
-            simulator=job.source.name,
-            system=job.source.label,
+            **trained_as(job.source, job.start),
             seed=job.cfg.seed,
             recipe=recipe_hash(job.cfg),
             data=job.identity["data"],
