@@ -119,7 +119,7 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     cfg, run, source = job.cfg, job.run, job.source
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
     torch.set_num_threads(max(1, available_cores() // cfg.jobs))
-    tests = test_streams(source)
+    tests = tested_streams(source)
     task = build_task(cfg, job.protocol, list(tests))
     checkpoint = checkpoint_path(cfg, run, job.shorter, job.identity, task.model)
     trainer = build_trainer(cfg, run, job.identity)
@@ -132,7 +132,8 @@ def execute(job: Job, times: PhaseTimes) -> bool:
         if cfg.overwrite:
             run.put_aside()
         run.save_config(cfg, job.identity)
-    with times.measure(f"train {source.name}", resumed=checkpoint is not None):
+    name = trained_as(source, job.start)["simulator"]
+    with times.measure(f"train {name}", resumed=checkpoint is not None):
         start = time.perf_counter()
         with resumable(run):
             trainer.fit(task, datamodule, ckpt_path=checkpoint)
@@ -148,7 +149,7 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     return True
 
 
-def test_streams(source: EventSource) -> dict[str, EventSource]:
+def tested_streams(source: EventSource) -> dict[str, EventSource]:
     """The events to test on: those of the training, and the recorded ones where they differ."""
     own = source.evaluation if isinstance(source, MixedEvents) else source
     if isinstance(own, RecordedEvents):

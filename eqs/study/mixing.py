@@ -73,6 +73,7 @@ def mixing_curve(study: pd.DataFrame) -> Figure:
             xlabel="real training recordings, %", ylabel="mAP on real events (higher is better)"
         )
         axes.margins(y=0.12)
+        axes.set_ylim(bottom=0)
         drawing.legend(*axes.get_legend_handles_labels(), loc="outside upper left", ncols=2)
     return drawing
 
