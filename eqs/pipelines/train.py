@@ -62,7 +62,7 @@ def train(cfg: DictConfig) -> RunResult | None:
             log.info("%s is finished already; overwrite=true trains it again", job.run.folder)
         elif not execute(job, times):
             return None
-    show(job.run.result)
+    show(job.run)
     return job.run.result
 
 
@@ -119,7 +119,7 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     cfg, run, source = job.cfg, job.run, job.source
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
     torch.set_num_threads(max(1, available_cores() // cfg.jobs))
-    tests = tested_streams(source)
+    tests = streams_to_test(source)
     task = build_task(cfg, job.protocol, list(tests))
     checkpoint = checkpoint_path(cfg, run, job.shorter, job.identity, task.model)
     trainer = build_trainer(cfg, run, job.identity)
@@ -149,7 +149,7 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     return True
 
 
-def tested_streams(source: EventSource) -> dict[str, EventSource]:
+def streams_to_test(source: EventSource) -> dict[str, EventSource]:
     """The events to test on: those of the training, and the recorded ones where they differ."""
     own = source.evaluation if isinstance(source, MixedEvents) else source
     if isinstance(own, RecordedEvents):
@@ -195,11 +195,12 @@ def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]
     return task
 
 
-def show(result: RunResult) -> None:
-    """Print both mAPs of a run."""
-    own, real = result.own, result.real
+def show(run: Run) -> None:
+    """Print both mAPs of a run and its folder, which `model.weights` takes."""
+    result, own, real = run.result, run.result.own, run.result.real
     Console().print(
         f"[bold]{result.system}[/bold] seed {result.seed}: "
         f"own test mAP {100 * own.map:.1f} (AP50 {100 * own.map_50:.1f}), "
         f"real test mAP {100 * real.map:.1f} (AP50 {100 * real.map_50:.1f})"
     )
+    Console(soft_wrap=True).print(f"[bold]run[/bold]: {run.folder}")

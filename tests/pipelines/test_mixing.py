@@ -21,7 +21,7 @@ from eqs.pipelines.resolvers import register_resolvers
 from eqs.pipelines.result import RunResult
 from eqs.pipelines.runs import Run
 from eqs.pipelines.start import start_of, trained_as
-from eqs.pipelines.train import Job, tested_streams, train
+from eqs.pipelines.train import Job, streams_to_test, train
 
 CONFIGS = Path(eqs.__file__).parent / "configs"
 ALONE = "sim.streams.simulated.share=0"
@@ -260,7 +260,7 @@ def test_what_is_no_simulator_is_not_scored(tmp_path: Path, result_of) -> None:
 def test_both_tests_are_one_where_the_own_events_are_the_real_ones(tmp_path: Path) -> None:
     def streams(*overrides: str) -> list[str]:
         cfg = configured(tmp_path, *overrides)
-        return list(tested_streams(event_source(cfg.sim, cfg)))
+        return list(streams_to_test(event_source(cfg.sim, cfg)))
 
     assert streams("sim=mix") == streams("sim=esim") == ["own", "real"]
     assert streams("sim=mix", "sim.evaluated_on=real") == streams("sim=real") == ["real"]
