@@ -7,6 +7,7 @@ from eqs.data.event_view import EventView
 from eqs.data.given import GivenEvents, GivenStreams
 from eqs.data.label_files import ArrayLabels, CocoLabels, YoloLabels
 from eqs.data.labels import LabelProtocol, detector_rows
+from eqs.data.mixed import Mix, MixedEvents
 from eqs.data.own import OwnDataset
 from eqs.data.recording import Recording
 from eqs.data.simulated import EventSource, RecordedEvents, SimulatedEvents
@@ -23,6 +24,8 @@ __all__ = [
     "GivenEvents",
     "GivenStreams",
     "LabelProtocol",
+    "Mix",
+    "MixedEvents",
     "OwnDataset",
     "RecordedEvents",
     "Recording",

@@ -69,14 +69,25 @@ def partition_of(path: str | Path, given: int | None, key: str = KEYS) -> int:
     return next((int(each) for each in (given, stored) if each is not None), PUBLISHED_SPLIT)
 
 
+def weights_file(path: str | Path) -> Path:
+    """The checkpoint itself, or the weights in the folder of a finished training."""
+    path = Path(path)
+    return path / "weights.ckpt" if path.is_dir() else path
+
+
 def read_content(path: str | Path, key: str = KEYS) -> dict[str, Any]:
     """Everything in a checkpoint; nothing but tensors and plain values is unpickled.
+
+    Args:
+        path: checkpoint file, or the folder of a finished training.
+        key: configuration key to name in errors.
 
     Raises:
         FileNotFoundError: no such file.
         ValueError: not a checkpoint.
     """
-    if not Path(path).is_file():
+    path = weights_file(path)
+    if not path.is_file():
         raise FileNotFoundError(f"Expected a checkpoint at {path}, got no such file; set {key}")
     try:
         content = torch.load(path, map_location="cpu", weights_only=True)

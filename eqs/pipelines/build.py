@@ -12,6 +12,8 @@ from eqs.data import (
     EventSource,
     GivenEvents,
     GivenStreams,
+    Mix,
+    MixedEvents,
     RecordedEvents,
     SimulatedEvents,
 )
@@ -19,23 +21,51 @@ from eqs.simulators import Simulator
 
 
 def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:
-    """The events a configured simulator makes, given ones, or the recorded ones.
+    """The events a configured simulator makes, given ones, the recorded ones, or several mixed.
 
     Raises:
         ValueError: it is none of these.
     """
     built = instantiate(simulator)
+    root = Path(cfg.paths.simulated) / cfg.data.name
+    return mixed(built, root) if isinstance(built, Mix) else source_of(built, root)
+
+
+def source_of(built: object, root: Path) -> EventSource:
+    """The event source of what a configuration names.
+
+    Args:
+        built: a simulator, given events or the recorded ones.
+        root: folder for the streams of one data set.
+
+    Raises:
+        ValueError: it is none of these.
+    """
     if isinstance(built, RecordedEvents):
         return built
-    root = Path(cfg.paths.simulated) / cfg.data.name
     if isinstance(built, GivenEvents):
         return GivenStreams(built, root)
     if not isinstance(built, Simulator):
         raise ValueError(
-            f"Expected a simulator or the recorded events, got a {type(built).__name__} from "
-            f"{simulator.get('_target_')}; set sim=esim, sim=real or another of configs/sim"
+            "Expected a simulator, given or recorded events, got a "
+            f"{type(built).__name__}; set sim=esim, sim=real or another of configs/sim"
         )
     return SimulatedEvents(built, root)
+
+
+def mixed(mix: Mix, root: Path) -> MixedEvents:
+    """The event source of a mix.
+
+    Raises:
+        ValueError: a stream of it is no single one.
+    """
+    shares = {name: float(stream["share"]) for name, stream in mix.streams.items()}
+    return MixedEvents(
+        sources={name: source_of(each["events"], root) for name, each in mix.streams.items()},
+        shares=shares,
+        evaluated_on=mix.evaluated_on or next(name for name, share in shares.items() if share),
+        seed=mix.seed,
+    )
 
 
 def dataset(cfg: DictConfig) -> Dataset:

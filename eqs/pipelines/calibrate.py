@@ -196,7 +196,10 @@ def check(simulator: object, ranges: Sequence[Range]) -> None:
         ValueError: no simulator, an unknown parameter, or bounds that leave out where it starts.
     """
     if not isinstance(simulator, Simulator):
-        raise ValueError("Expected a simulator to calibrate, got sim=real; set sim=v2e or another")
+        name = getattr(simulator, "name", type(simulator).__name__)
+        raise ValueError(
+            f"Expected a simulator to calibrate, got sim={name}; set sim=v2e or another"
+        )
     for each in ranges:
         for name in each.parameters:
             value = simulator.parameters().get(name)

@@ -12,7 +12,8 @@ from typing import Any
 from omegaconf import DictConfig
 from rich.console import Console
 
-from eqs.data import Dataset, EventSource
+from eqs.data import Dataset, EventSource, MixedEvents
+from eqs.drawing import save_figure
 from eqs.files import short_hash
 from eqs.metrics.grid import fewest_windows
 from eqs.names import BASELINE
@@ -20,7 +21,7 @@ from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import require_judge
 from eqs.pipelines.publish import Findings, publish
-from eqs.pipelines.recipe import data_hash, differences, recipe
+from eqs.pipelines.recipe import WEIGHTS, apart, data_hash, differences, recipe
 from eqs.pipelines.resume import LISTED, NAMED_APART
 from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import Run, finished_runs
@@ -28,7 +29,15 @@ from eqs.pipelines.sanity import sanity
 from eqs.pipelines.score import score_recordings
 from eqs.pipelines.scoring import find_scoring
 from eqs.pipelines.timing import phase_times
-from eqs.study import eqs_table, print_eqs, print_study, study_table, write_table
+from eqs.study import (
+    eqs_table,
+    has_mixing,
+    mixing_curve,
+    print_eqs,
+    print_study,
+    study_table,
+    write_table,
+)
 
 log = logging.getLogger(__name__)
 
@@ -60,6 +69,9 @@ def evaluate(cfg: DictConfig) -> None:
         # Beside `study.csv`, which holds scores as well.
         write_table(study, results / "accuracy.csv")
         print_study(study, console)
+        if has_mixing(study):
+            drawn = save_figure(mixing_curve(study), results / "figures", "mixing")
+            console.print(f"[bold]mixing[/bold]: {drawn}")
     else:
         raise ValueError(
             f"Expected a finished run on {cfg.data.name} with this recipe and these data, got "
@@ -68,15 +80,21 @@ def evaluate(cfg: DictConfig) -> None:
 
 
 def comparable_runs(cfg: DictConfig, found: Sequence[Run]) -> list[Run]:
-    """The runs of the configured recipe on the data as they are; others are named and left out."""
+    """The runs of the configured recipe on the data as they are; others are named and left out.
+
+    A run that started from the weights of another may differ in these: its row says from which.
+    """
     wanted, data = recipe(cfg), data_hash(dataset(cfg))
     named = short_hash(wanted)
-    kept = [run for run in found if (run.result.recipe, run.result.data) == (named, data)]
+    kept = []
     for run in found:
-        if run in kept:
-            continue
         there = {key: value for key, value in run.recipe().items() if key not in NAMED_APART}
-        reasons = differences(there, wanted) if run.result.recipe != named and there else []
+        started = there and run.result.before and apart(there, wanted) <= {WEIGHTS}
+        same = run.result.recipe == named or started
+        if same and run.result.data == data:
+            kept.append(run)
+            continue
+        reasons = differences(there, wanted) if there and not same else []
         if run.result.data != data:
             reasons.insert(0, "other data")
         shown = ", ".join(reasons[:LISTED]) or "another recipe"
@@ -95,6 +113,7 @@ def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
             {
                 "simulator": result.simulator,
                 "system": names[result.system],
+                "trained_on": result.trained_on,
                 "seed": result.seed,
                 "map_sim": own.map,
                 "map50_sim": own.map_50,
@@ -105,6 +124,9 @@ def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
                 "protocol": result.protocol["hash"],
                 "recipe": result.recipe,
                 "data": result.data,
+                "real_share": result.real_share,
+                "beside": result.beside,
+                "before": result.before,
             }
         )
     return rows
@@ -137,7 +159,7 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         judge=scoring.judge,
         headline=scoring.headline,
         systems=systems,
-        runs={names[run.result.system]: run for run in runs},
+        runs={names[run.result.system]: run for run in runs if run.result.plain},
         scores=scores,
         eqs=table,
         study=study_table(study, table) if runs else None,
@@ -175,7 +197,9 @@ def with_reverse(
 def scored_systems(cfg: DictConfig, runs: Sequence[Run]) -> Mapping[str, EventSource]:
     """Configured simulators and those of the finished runs, by the name used in the tables."""
     configured = [event_source(simulator, cfg) for simulator in cfg.simulators.values()]
-    trained = [event_source(run.config().sim, cfg) for run in runs]
+    if any(isinstance(source, MixedEvents) for source in configured):
+        raise ValueError("Expected simulators to score, got a mix; take sim=mix out of simulators")
+    trained = [event_source(run.config().sim, cfg) for run in runs if run.result.plain]
     sources = {s.label: s for s in [*configured, *trained] if s.name != "real"}
     names = short_names([(source.name, label) for label, source in sources.items()])
     return {names[label]: source for label, source in sources.items()}

@@ -25,6 +25,8 @@ from eqs.study import (
     ReportFigure,
     accuracy_bars,
     correlations,
+    has_mixing,
+    mixing_curve,
     report_figure,
     score_against_accuracy,
     sequence_dots,
@@ -137,6 +139,8 @@ def draw(
         drawn = score_against_accuracy(found.study, found.eqs, related)
         figures["score_against_accuracy"] = report_figure(drawn, folder, "score_against_accuracy")
         figures["accuracy"] = report_figure(accuracy_bars(found.study), folder, "accuracy")
+        if has_mixing(found.study):
+            figures["mixing"] = report_figure(mixing_curve(found.study), folder, "mixing")
     figures["scores_by_sequence"] = report_figure(
         sequence_dots(found.eqs), folder, "scores_by_sequence"
     )

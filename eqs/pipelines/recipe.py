@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
@@ -11,9 +10,11 @@ from omegaconf import DictConfig, OmegaConf
 from eqs.content import content_hash
 from eqs.data import Dataset
 from eqs.files import short_hash
+from eqs.models.checkpoint import weights_file
 
 VERSION = 1  # raised whenever equal settings begin to train other detectors
 
+WEIGHTS = "model.weights"  # the key under which a recipe holds what weights it starts from
 # Parts of the configuration on which a training depends, beside its stream and its seed ...
 PARTS = ("data", "protocol", "model", "recipe", "datamodule", "task", "trainer", "callbacks")
 # ... and, here alone, what changes no number: where files lie (their content counts, see
@@ -55,11 +56,12 @@ def recipe(cfg: DictConfig) -> dict[str, Any]:
                 found |= _flat(plain, f"{part}.{name}")
     weights = cfg.model.get("weights")
     if weights is not None:
-        if not Path(weights).is_file():
+        file = weights_file(weights)
+        if not file.is_file():
             raise FileNotFoundError(
-                f"Expected weights to start from at {weights}, found none; set model.weights"
+                f"Expected weights to start from at {file}, found none; set model.weights"
             )
-        found["model.weights"] = content_hash(weights)
+        found[WEIGHTS] = content_hash(file)
     return found
 
 
@@ -78,6 +80,11 @@ def data_hash(data: Dataset) -> str:
     )
 
 
+def apart(there: Mapping[str, Any], here: Mapping[str, Any]) -> set[str]:
+    """The settings in which one recipe differs from another."""
+    return {key for key in there.keys() | here.keys() if there.get(key) != here.get(key)}
+
+
 def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
     """How one recipe differs from another, setting by setting.
 
@@ -86,9 +93,7 @@ def differences(there: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
         ['recipe.epochs 12 instead of 24']
     """
     return [
-        f"{key} {there.get(key)} instead of {here.get(key)}"
-        for key in sorted(there.keys() | here.keys())
-        if there.get(key) != here.get(key)
+        f"{key} {there.get(key)} instead of {here.get(key)}" for key in sorted(apart(there, here))
     ]
 
 

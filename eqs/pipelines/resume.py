@@ -11,7 +11,7 @@ from omegaconf import DictConfig, OmegaConf
 from torch import nn
 
 from eqs.models.checkpoint import check_resumable
-from eqs.pipelines.recipe import differences, recipe
+from eqs.pipelines.recipe import apart, differences, recipe
 from eqs.pipelines.runs import Run
 from eqs.training import IDENTITY
 
@@ -95,8 +95,8 @@ def shorter_ones(run: Run, identity: Mapping[str, Any]) -> list[Run]:
     for path in run.folder.parent.glob("*/result.json"):
         other = Run(path.parent)
         there = other.recipe()
-        apart = {key for key in {*there, *identity} if there.get(key) != identity.get(key)}
-        if "recipe.epochs" in apart and apart <= FOLLOW_EPOCHS:
+        changed = apart(there, identity)
+        if "recipe.epochs" in changed and changed <= FOLLOW_EPOCHS:
             found.append((there["recipe.epochs"], other))
     shorter = [each for each in found if each[0] < identity["recipe.epochs"]]
     return [other for _, other in sorted(shorter, key=lambda each: -each[0])[:1]]

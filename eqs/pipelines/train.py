@@ -15,7 +15,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
 
-from eqs.data import Dataset, EventSource, LabelProtocol, RecordedEvents
+from eqs.data import Dataset, EventSource, LabelProtocol, MixedEvents, RecordedEvents
 from eqs.files import one_at_a_time, short_hash
 from eqs.pipelines.build import event_source
 from eqs.pipelines.command import explained
@@ -26,6 +26,7 @@ from eqs.pipelines.recipe import data_hash, recipe, recipe_hash, trials
 from eqs.pipelines.result import RunResult
 from eqs.pipelines.resume import check_checkpoint, checkpoint_path, identity_of, shorter_config
 from eqs.pipelines.runs import Run
+from eqs.pipelines.start import Start, start_of, trained_as
 from eqs.pipelines.timing import PhaseTimes, phase_times
 from eqs.pipelines.trainer import build_trainer, check_trainer, resumable
 from eqs.processors import available_cores
@@ -61,7 +62,7 @@ def train(cfg: DictConfig) -> RunResult | None:
             log.info("%s is finished already; overwrite=true trains it again", job.run.folder)
         elif not execute(job, times):
             return None
-    show(job.run.result)
+    show(job.run)
     return job.run.result
 
 
@@ -77,6 +78,7 @@ class Job:
         identity: what its checkpoints say of it.
         run: its folder.
         shorter: the training that it goes on from for longer, if it does.
+        start: the detector trained here whose weights it starts from, if it does.
     """
 
     cfg: DictConfig
@@ -86,6 +88,7 @@ class Job:
     identity: Mapping[str, Any]
     run: Run
     shorter: Run | None
+    start: Start | None
 
     @classmethod
     def of(
@@ -101,6 +104,7 @@ class Job:
             identity=identity_of(cfg, source.label, content),
             run=run_of(cfg, source, content),
             shorter=None if shorter is None else run_of(shorter, source, content),
+            start=start_of(cfg),
         )
 
 
@@ -115,9 +119,7 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     cfg, run, source = job.cfg, job.run, job.source
     lightning.seed_everything(cfg.seed, workers=True, verbose=False)
     torch.set_num_threads(max(1, available_cores() // cfg.jobs))
-    tests: dict[str, EventSource] = {"own": source, "real": RecordedEvents()}
-    if isinstance(source, RecordedEvents):
-        del tests["own"]  # on the recorded events both tests are the same one
+    tests = streams_to_test(source)
     task = build_task(cfg, job.protocol, list(tests))
     checkpoint = checkpoint_path(cfg, run, job.shorter, job.identity, task.model)
     trainer = build_trainer(cfg, run, job.identity)
@@ -130,7 +132,8 @@ def execute(job: Job, times: PhaseTimes) -> bool:
         if cfg.overwrite:
             run.put_aside()
         run.save_config(cfg, job.identity)
-    with times.measure(f"train {source.name}", resumed=checkpoint is not None):
+    name = trained_as(source, job.start)["simulator"]
+    with times.measure(f"train {name}", resumed=checkpoint is not None):
         start = time.perf_counter()
         with resumable(run):
             trainer.fit(task, datamodule, ckpt_path=checkpoint)
@@ -146,6 +149,14 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     return True
 
 
+def streams_to_test(source: EventSource) -> dict[str, EventSource]:
+    """The events to test on: those of the training, and the recorded ones where they differ."""
+    own = source.evaluation if isinstance(source, MixedEvents) else source
+    if isinstance(own, RecordedEvents):
+        return {"real": own}
+    return {"own": own, "real": RecordedEvents()}
+
+
 def finish(
     job: Job,
     trainer: lightning.Trainer,
@@ -157,14 +168,13 @@ def finish(
     trainer.save_checkpoint(job.run.weights, weights_only=True)
     if not trainer.is_global_zero:
         return
-    if isinstance(job.source, RecordedEvents):
+    if isinstance(job.source, RecordedEvents) and job.start is None:
         with times.measure("judge"):
             write_judge(job.cfg, job.run, job.data, trainer.strategy.root_device)
     real, card = task.measured["real"], job.protocol.card()
     job.run.finish(
         RunResult(
-            simulator=job.source.name,
-            system=job.source.label,
+            **trained_as(job.source, job.start),
             seed=job.cfg.seed,
             recipe=recipe_hash(job.cfg),
             data=job.identity["data"],
@@ -185,11 +195,12 @@ def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]
     return task
 
 
-def show(result: RunResult) -> None:
-    """Print both mAPs of a run."""
-    own, real = result.own, result.real
+def show(run: Run) -> None:
+    """Print both mAPs of a run and its folder, which `model.weights` takes."""
+    result, own, real = run.result, run.result.own, run.result.real
     Console().print(
         f"[bold]{result.system}[/bold] seed {result.seed}: "
         f"own test mAP {100 * own.map:.1f} (AP50 {100 * own.map_50:.1f}), "
         f"real test mAP {100 * real.map:.1f} (AP50 {100 * real.map_50:.1f})"
     )
+    Console(soft_wrap=True).print(f"[bold]run[/bold]: {run.folder}")

@@ -13,6 +13,7 @@ from eqs.study.correlation import (
     write_correlations,
 )
 from eqs.study.figures import accuracy_bars, score_against_accuracy, sequence_dots
+from eqs.study.mixing import has_mixing, mixing_curve, mixing_points
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
 from eqs.study.sanity import order_faults, sanity_figure, sanity_table, severity_correlations
@@ -43,6 +44,9 @@ __all__ = [
     "correlations",
     "drops",
     "eqs_table",
+    "has_mixing",
+    "mixing_curve",
+    "mixing_points",
     "order_faults",
     "print_calibration",
     "print_eqs",

@@ -11,7 +11,14 @@ from rich.table import Table as ConsoleTable
 from eqs.study.layout import Table, number, scores_table
 from eqs.study.notes import notes
 from eqs.study.sanity import order_faults, readings, severity_correlations, untested
-from eqs.study.tables import MAP_COLUMNS, Drops, score_columns, summarise_eqs, summarise_study
+from eqs.study.tables import (
+    MAP_COLUMNS,
+    Drops,
+    composed,
+    score_columns,
+    summarise_eqs,
+    summarise_study,
+)
 
 CELL_FRAME = 3  # a border and a space on either side
 
@@ -20,7 +27,8 @@ def print_study(study: pd.DataFrame, console: Console) -> None:
     """Print mAP and drops of every system, means over seeds, times 100 as the paper does."""
     systems = summarise_study(study)
     several = ["seeds"] if systems["seeds"].gt(1).any() else []
-    names = ["system", *several, *MAP_COLUMNS, *Drops._fields, "eqs"]
+    mixed = ["trained_on"] if composed(systems).any() else []
+    names = ["system", *mixed, *several, *MAP_COLUMNS, *Drops._fields, "eqs"]
     _print(_chosen(systems, names), "Detection accuracy (mAP, drops: x 100)", console)
 
 

@@ -16,7 +16,7 @@ from eqs.drawing.style import MARKERS, STYLE, colours, figure
 from eqs.names import REFERENCE
 from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.means import complete_seeds
-from eqs.study.tables import simulated, summarise_eqs, summarise_study
+from eqs.study.tables import composed, simulated, summarise_eqs, summarise_study
 
 # Column, axis label, factor from the table's unit to the axis.
 PANELS = (
@@ -128,8 +128,8 @@ def _verdict(result: Correlation | None) -> str:
 
 
 def accuracy_bars(study: pd.DataFrame) -> Figure:
-    """Simulated and real mAP of every system side by side, times 100."""
-    systems = summarise_study(study)
+    """Simulated and real mAP of every simulator and of the reference side by side, times 100."""
+    systems = summarise_study(study[~composed(study)])
     sides = (
         ("map_sim", -0.2, 0.45, "tested on its simulated events"),
         ("map_real", 0.2, 1.0, "tested on real events"),

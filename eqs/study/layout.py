@@ -13,6 +13,7 @@ from eqs.study.tables import (
     MAP_COLUMNS,
     RATIO_FLOOR,
     baseline_columns,
+    composed,
     score_columns,
     simulated,
     summarise_eqs,
@@ -81,12 +82,12 @@ def accuracy_table(systems: pd.DataFrame) -> Table:
     """Simulated and real mAP with all drops, the printed mAPs of the same simulator beside."""
     printed = printed_accuracy()
     rows = []
-    for _, row in systems.iterrows():
+    for (_, row), mixed in zip(systems.iterrows(), composed(systems), strict=True):
         known = row["simulator"] in printed.index and row["simulator"] == row["system"]
         theirs = printed.loc[row["simulator"]] if known else {}
         rows.append(
             (
-                str(row["system"])
+                str(row["trained_on" if mixed else "system"])
                 + (" (no simulator)" if row["simulator"] == REFERENCE else "")
                 + (f", seeds: {row['seeds']}" if systems["seeds"].nunique() > 1 else ""),
                 _with_spread(row, "map_sim"),

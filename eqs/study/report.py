@@ -29,6 +29,7 @@ from eqs.study.printed import ACCURACY_TABLE, SCORES_TABLE
 from eqs.study.tables import (
     RATIO_FLOOR,
     baseline_columns,
+    composed,
     summarise_study,
 )
 
@@ -102,6 +103,7 @@ def render_report(content: ReportContent) -> str:
     return template.render(
         content=content,
         trained=content.study is not None and len(content.study) > 0,
+        mixed=content.study is not None and bool(composed(content.study).any()),
         notes=notes(content.eqs, content.fewest_windows),
         answer=answer(content.eqs, content.study, content.correlations),
         real="reference sensor" if content.data_is_rendered else "real sensor",

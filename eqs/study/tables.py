@@ -26,6 +26,7 @@ MAP_COLUMNS = ("map_sim", "map50_sim", "map_real", "map50_real")
 STUDY_COLUMNS = (
     "simulator",
     "system",
+    "trained_on",
     "seed",
     *MAP_COLUMNS,
     "drop_abs",
@@ -57,6 +58,7 @@ EQS_COLUMNS = (
 TEXT_COLUMNS = frozenset(
     {"simulator", "system", "sequence", "split", "corruption", "anchor"}
     | {"definition", "weights_sha256", "protocol", "recipe", "data"}
+    | {"trained_on", "beside", "before"}
 )
 COUNT_COLUMNS = ("n_windows", "n_events_real", "n_events_sim")
 TIME_COLUMNS = ("start_us", "stop_us")
@@ -128,8 +130,9 @@ def study_table(
 
     Args:
         rows: each with `simulator`, `seed` and the four mAPs in [0, 1]; `system` names one
-            simulator with one setting and defaults to `simulator`. Columns `ap_<set>_<class>`
-            hold AP per class. A negative AP, COCO's mark for "no such box", becomes empty.
+            simulator with one setting and defaults to `simulator`, as does `trained_on`, all the
+            events that the detector saw, in words. Columns `ap_<set>_<class>` hold AP per class. A
+            negative AP, COCO's mark for "no such box", becomes empty.
         scores: an EQS table; its means over sequences are joined by system.
 
     Raises:
@@ -142,6 +145,8 @@ def study_table(
     table[precision] = table[precision].where(table[precision] >= 0)
     _refuse_percentages(table, precision)
     table[list(Drops._fields)] = _lost(table)
+    if "trained_on" not in table:
+        table["trained_on"] = table["simulator"]
     if scores is not None:
         means = summarise_eqs(scores)
         joined = [*score_columns(means), *baseline_columns(means), "definition", "weights_sha256"]
@@ -198,6 +203,8 @@ def summarise_study(study: pd.DataFrame) -> pd.DataFrame:
     means[list(Drops._fields)] = _lost(means)
     means.insert(0, "simulator", groups["simulator"].first())
     means.insert(1, "seeds", groups["seed"].nunique())
+    if "trained_on" in study:
+        means.insert(1, "trained_on", groups["trained_on"].first())
     return means.reset_index()
 
 
@@ -231,8 +238,18 @@ def summarise_eqs(scores: pd.DataFrame) -> pd.DataFrame:
 
 
 def simulated(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of simulators: the real reference is an upper bound, not a system under test."""
-    return table[table["simulator"] != REFERENCE]
+    """The rows of simulators: the real reference is an upper bound, not a system under test.
+
+    Neither is a detector that saw several streams, or a part of one: no stream of it has a score.
+    """
+    return table[(table["simulator"] != REFERENCE) & ~composed(table)]
+
+
+def composed(table: pd.DataFrame) -> pd.Series:
+    """Which rows are of detectors that saw anything but one stream whole."""
+    if "trained_on" not in table:  # a table of scores
+        return pd.Series(False, index=table.index)
+    return table["trained_on"] != table["simulator"]
 
 
 def _lost(table: pd.DataFrame) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import lightning
 from torch.utils.data import DataLoader, Sampler
@@ -32,6 +32,14 @@ class EventPaths(Protocol):
 
     def path(self, recording: Recording) -> Path:
         """The recording's event file."""
+
+
+@runtime_checkable
+class TrainingFiles(Protocol):
+    """Says which recordings are trained on, each with which events."""
+
+    def training_files(self, recordings: Sequence[Recording]) -> list[tuple[Recording, Path]]:
+        """Recordings and event files to train on; a recording may occur with several."""
 
 
 def check_whole_numbers(values: Mapping[str, object], least: int) -> None:
@@ -75,8 +83,9 @@ class StepSampler(Sampler[int]):
 class EventDataModule(lightning.LightningDataModule):
     """Training, validation and test batches of one data set.
 
-    Training and validation read the events of one source; each test stream reads those of its own,
-    from the same recordings, so that only the events differ between the tests.
+    Training and validation read the events of one source, which may choose what is trained on
+    (`TrainingFiles`). Each test stream reads those of its own, from the same recordings, so that
+    only the events differ between the tests.
 
     With several processes each trains its own slots and evaluates its own recordings; the trainer
     must leave the samplers alone (`use_distributed_sampler: false`).
@@ -203,17 +212,22 @@ class EventDataModule(lightning.LightningDataModule):
         return EvaluationDataset(sources[rank::world_size], chunk_length=self.evaluation_length)
 
     def sources(self, split: str, events: EventPaths) -> list[WindowSource]:
-        """The recordings of a split with the events of one source."""
+        """The recordings of a split with the events of one source; of train, those it chooses."""
+        recordings = self.dataset.recordings(split)
+        if split == "train" and isinstance(events, TrainingFiles):
+            files = events.training_files(recordings)
+        else:
+            files = [(recording, events.path(recording)) for recording in recordings]
         return [
             WindowSource(
                 recording=recording,
-                events_path=events.path(recording),
+                events_path=path,
                 protocol=self.protocol,
                 binning=self.binning,
                 cache=self.histogram_cache,
                 span_us=self._span_of_tests(recording) if split == "test" else None,
             )
-            for recording in self.dataset.recordings(split)
+            for recording, path in files
         ]
 
     def _span_of_tests(self, recording: Recording) -> tuple[int, int] | None:

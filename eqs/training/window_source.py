@@ -191,12 +191,13 @@ def said_of(sources: Sequence[WindowSource]) -> list[str]:
             f"{matched} of {times} label times belong to a frame, at most {farthest} us apart"
         )
     labelled = [source for source in sources if source.recording.has_labels]
-    unseen = {s.recording.name: int((~s.watched).sum()) for s in labelled if not s.watched.all()}
-    if unseen:
+    outside = [source for source in labelled if not source.watched.all()]
+    if outside:
         windows = sum(len(source) for source in labelled)
         found.append(
-            f"{sum(unseen.values())} of {windows} labelled windows lie outside the events' span "
-            f"and are left out, in {', '.join(unseen)}"
+            f"{sum(int((~source.watched).sum()) for source in outside)} of {windows} labelled "
+            "windows lie outside the events' span and are left out, in "
+            + ", ".join(dict.fromkeys(source.recording.name for source in outside))
         )
     notes = [
         note

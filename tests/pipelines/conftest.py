@@ -30,6 +30,7 @@ def result_of(simulator: str, **changed: object) -> RunResult:
         "real": accuracy,
         "protocol": {"name": "coco", "hash": "0"},
         "seconds": 1.5,
+        "stages": ({simulator: 1.0},),
     }
     return RunResult(**{**fields, **changed})
 

@@ -132,6 +132,7 @@ def test_every_simulator_has_a_parameter_file():
         *SIMULATORS,
         "real",
         "files",
+        "mix",
     }
 
 
