@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import random_events
 from PIL import Image
 
 ROOT = Path(__file__).parents[2]
@@ -31,10 +30,9 @@ def frames(folder: Path, count: int = 5) -> None:
         Image.fromarray(picture).save(folder / f"{index:04d}.png")
 
 
-def labelled(folder: Path) -> None:
+def labelled(folder: Path, events) -> None:
     """A recording as the page's YAML describes it."""
     frames(folder / "frames")
-    events = random_events(900, 48, 64, 0, 200_001)
     np.savez(folder / "events.npz", t=events.t, x=events.x, y=events.y, p=events.p)
     (folder / "timestamps.txt").write_text("".join(f"{50_000 * k}\n" for k in range(5)))
     images = [{"id": k, "file_name": f"{k:04d}.png"} for k in range(5)]
@@ -44,9 +42,8 @@ def labelled(folder: Path) -> None:
     (folder / "labels.json").write_text(json.dumps({"images": images, "annotations": boxes}))
 
 
-def evt2(path: Path) -> None:
+def evt2(path: Path, events) -> None:
     """A RAW file: a word of time, then one event of that time, again and again."""
-    events = random_events(900, 48, 64, 0, 200_001)
     high = (8 << 28) | (events.t >> 6)
     low = (events.p.astype(np.int64) << 28) | ((events.t & 63) << 22)
     low |= (events.x.astype(np.int64) << 11) | events.y
@@ -66,12 +63,12 @@ def typed(place: Path, verb: str, *arguments: str) -> str:
 
 
 @pytest.mark.slow
-def test_the_data_set_in_a_yaml_is_checked_and_trained_on(tmp_path):
+def test_the_data_set_in_a_yaml_is_checked_and_trained_on(tmp_path, make_events):
     assert blocks("yaml")[0].count("\n") <= 40
     (tmp_path / "my/data").mkdir(parents=True)
     (tmp_path / "my/data/mine.yaml").write_text(blocks("yaml")[0])
     for name in ("day_1", "dusk_1", "night_1"):
-        labelled(tmp_path / "recordings" / name)
+        labelled(tmp_path / "recordings" / name, make_events(900, 48, 64, 0, 200_001))
     said = typed(tmp_path, "check", "data=mine", "protocol=own")
     assert "all 3 recordings can be used" in said
     trained = typed(tmp_path, "train", "data=mine", "protocol=own", "sim=esim", *SMALL)
@@ -82,7 +79,7 @@ def test_the_data_set_in_a_yaml_is_checked_and_trained_on(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_data_set_in_a_class_is_trained_on(tmp_path):
+def test_the_data_set_in_a_class_is_trained_on(tmp_path, make_events):
     (source,) = blocks("python")
     assert source.count("\n") <= 40
     (tmp_path / "my_camera.py").write_text(source)
@@ -91,7 +88,7 @@ def test_the_data_set_in_a_class_is_trained_on(tmp_path):
     for split in ("train", "val", "test"):
         folder = tmp_path / "recordings" / split / f"{split}_1"
         frames(folder / "frames")
-        evt2(folder / "events.raw")
+        evt2(folder / "events.raw", make_events(900, 48, 64, 0, 200_001))
         (folder / "boxes.csv").write_text("".join(f"{50_000 * k},4,5,30,20,2\n" for k in range(5)))
     said = typed(
         tmp_path, "train", "data=my_camera", "protocol.classes={car: [2]}", "sim=real", *SMALL
