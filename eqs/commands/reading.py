@@ -7,7 +7,7 @@ from pathlib import Path
 
 from eqs.events import Events
 from eqs.events.formats import decode, is_dsec
-from eqs.events.tables import UNITS_US
+from eqs.events.hints import UNITS_US, Hints
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
@@ -16,6 +16,9 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--width", type=int, help="columns, where the file does not say")
     parser.add_argument("--order", help="order of a table's columns, for instance txyp")
     parser.add_argument("--time-unit", choices=[*UNITS_US], help="unit of a table's times")
+    parser.add_argument(
+        "--first-pixel", type=int, choices=[0, 1], help="first row and column in a MATLAB file"
+    )
 
 
 def read(path: Path, given: argparse.Namespace) -> tuple[str, int, int, Events]:
@@ -27,5 +30,6 @@ def read(path: Path, given: argparse.Namespace) -> tuple[str, int, int, Events]:
     """
     if is_dsec(path):
         return "HDF5 in the layout of DSEC", 0, 0, Events.load(path, given.height, given.width)
-    found = decode(path, given.order, given.time_unit)
+    names = ("height", "width", "order", "time_unit", "first_pixel")
+    found = decode(path, Hints(**{name: getattr(given, name) for name in names}))
     return found.kind, found.disorder, found.dropped, found.events(given.height, given.width)

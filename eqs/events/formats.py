@@ -9,7 +9,9 @@ import h5py
 from eqs.events.aedat import read_aedat2, read_aedat3, read_aedat4
 from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
 from eqs.events.decoded import Decoded
+from eqs.events.hints import NOTHING_SAID, Hints
 from eqs.events.loaded import LoadedEvents
+from eqs.events.matlab import read_matlab
 from eqs.events.raw import read_prophesee
 from eqs.events.reader import EventReader
 from eqs.events.ros import read_bag
@@ -17,7 +19,7 @@ from eqs.events.tables import read_foreign_hdf5, read_numpy, read_text
 
 READ = (
     "DSEC, v2e, event_utils, MVSEC, M3ED and Metavision HDF5, RAW (EVT2, EVT2.1, EVT3), DAT, "
-    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, npy, npz, text and CSV"
+    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, npy, npz, MATLAB, text and CSV"
 )
 
 
@@ -35,7 +37,8 @@ def open_events(
     """
     if is_dsec(Path(path)):
         return EventReader(path, height, width, rows)
-    return LoadedEvents(decode(path).events(height, width), rows)
+    hints = Hints(height=height, width=width)
+    return LoadedEvents(decode(path, hints).events(height, width), rows)
 
 
 def is_dsec(path: Path) -> bool:
@@ -53,13 +56,12 @@ def is_dsec(path: Path) -> bool:
         return True  # whose reader says what is wrong
 
 
-def decode(path: Path | str, order: str | None = None, time_unit: str | None = None) -> Decoded:
+def decode(path: Path | str, hints: Hints = NOTHING_SAID) -> Decoded:
     """The events of a file that is not in the layout of DSEC.
 
     Args:
         path: the file.
-        order: order of the columns of a table without names, for instance `txyp`.
-        time_unit: unit of a table's times, where they are whole numbers: s, ms, us or ns.
+        hints: what the file leaves open.
 
     Raises:
         FileNotFoundError: there is no such file.
@@ -68,7 +70,7 @@ def decode(path: Path | str, order: str | None = None, time_unit: str | None = N
     path = Path(path)
     first = _first_bytes(path)
     if first[:8] == b"\x89HDF\r\n\x1a\n":
-        return read_foreign_hdf5(path, time_unit)
+        return read_foreign_hdf5(path, hints)
     if first[:1] == b"%":
         return read_prophesee(path)
     for start, read in (
@@ -79,13 +81,13 @@ def decode(path: Path | str, order: str | None = None, time_unit: str | None = N
         if first.startswith(start):
             return read(path)
     if first[:6] == b"\x93NUMPY" or (first[:4] == b"PK\x03\x04" and path.suffix == ".npz"):
-        return read_numpy(path, order, time_unit)
-    if first.startswith(b"MATLAB 5"):
-        raise ValueError(f"Expected {READ} in {path}, got a MATLAB file; save it as npz or CSV")
+        return read_numpy(path, hints)
+    if first.startswith(b"MATLAB "):
+        return read_matlab(path, hints)
     if path.suffix == ".bin":
         return read_forty_bits(path)
     if path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv", ".dat"):
-        return read_text(path, order, time_unit)
+        return read_text(path, hints)
     raise ValueError(f"Expected {READ} in {path}, got none of them; convert it")
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events.decoded import Decoded
+from eqs.events.hints import UNITS_US, Hints
 
-UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 NAMES = {
     "t": ("t", "ts", "time", "timestamp", "timestamps"),
     "x": ("x", "xs", "col", "column"),
@@ -26,10 +26,11 @@ ORDERS = ("txyp", "xytp", "xypt", "tpxy", "pxyt")
 COLUMNS = {"davis/left/events": ("xytp", "s"), "events": ("txyp", "us")}
 GROUPS = ("prophesee/left", "events", "CD/events")
 ECF = 36559
+LATEST_US, LAST_PIXEL = 1 << 62, (1 << 16) - 1
 LISTED = 8
 
 
-def read_text(path: Path, order: str | None = None, time_unit: str | None = None) -> Decoded:
+def read_text(path: Path, hints: Hints) -> Decoded:
     """Events of a text file or a zip of one: four numbers a line, with a header or without.
 
     A first line of two numbers is the sensor's width and height.
@@ -58,8 +59,8 @@ def read_text(path: Path, order: str | None = None, time_unit: str | None = None
         )
     except ValueError as error:
         raise ValueError(f"Expected four numbers a line in {path}, got: {error}") from error
-    columns = by_name(names, table) or by_order(table, path, order)
-    return decoded(columns, path, "a text file", time_unit, height, width)
+    columns = by_name(names, table) or by_order(table, path, hints.order)
+    return decoded(columns, path, "a text file", hints.time_unit, height, width)
 
 
 def _numbers(line: str, count: int) -> list[float]:
@@ -70,7 +71,7 @@ def _numbers(line: str, count: int) -> list[float]:
         return []
 
 
-def read_numpy(path: Path, order: str | None = None, time_unit: str | None = None) -> Decoded:
+def read_numpy(path: Path, hints: Hints) -> Decoded:
     """Events of an npy or npz file: four columns, named fields, or an array for each.
 
     Raises:
@@ -85,7 +86,7 @@ def read_numpy(path: Path, order: str | None = None, time_unit: str | None = Non
             arrays = {name: found[name] for name in found.files}
         named = by_key(arrays)
         if named:
-            return decoded(named, path, "an npz file", time_unit)
+            return decoded(named, path, "an npz file", hints.time_unit)
         tables = [each for each in arrays.values() if each.ndim == 2 or each.dtype.names]
         if len(tables) != 1:
             raise ValueError(f"Expected one table of events in {path}, got {sorted(arrays)}")
@@ -93,16 +94,17 @@ def read_numpy(path: Path, order: str | None = None, time_unit: str | None = Non
     if found.dtype.names:
         named = by_key({name: found[name] for name in found.dtype.names})
         if named:
-            return decoded(named, path, "a numpy file", time_unit)
+            return decoded(named, path, "a numpy file", hints.time_unit)
     if found.ndim != 2 or found.shape[1] != 4:
         raise ValueError(
             f"Expected events in four columns or named fields in {path}, got {found.dtype} of "
             f"shape {found.shape}"
         )
-    return decoded(by_order(found, path, order), path, "a numpy file", time_unit)
+    columns = by_order(found, path, hints.order)
+    return decoded(columns, path, "a numpy file", hints.time_unit)
 
 
-def read_foreign_hdf5(path: Path, time_unit: str | None = None) -> Decoded:
+def read_foreign_hdf5(path: Path, hints: Hints) -> Decoded:
     """Events of an HDF5 file of v2e, MVSEC, event_utils, M3ED or Metavision.
 
     Raises:
@@ -113,7 +115,7 @@ def read_foreign_hdf5(path: Path, time_unit: str | None = None) -> Decoded:
             found = file.get(place)
             if isinstance(found, h5py.Dataset) and found.ndim == 2 and found.shape[1] == 4:
                 columns = dict(zip(order, found[:].T, strict=True))
-                return decoded(columns, path, f"an HDF5 file ({place})", time_unit or unit)
+                return decoded(columns, path, f"an HDF5 file ({place})", hints.time_unit or unit)
         for place in GROUPS:
             group = file.get(place)
             if isinstance(group, h5py.Dataset) and group.dtype.names:
@@ -129,7 +131,7 @@ def read_foreign_hdf5(path: Path, time_unit: str | None = None) -> Decoded:
             named = by_key(arrays)
             if named:
                 unit = "s" if named["t"].dtype.kind == "f" else "us"
-                return decoded(named, path, f"an HDF5 file ({place})", time_unit or unit)
+                return decoded(named, path, f"an HDF5 file ({place})", hints.time_unit or unit)
         held: list[str] = []
         file.visititems(
             lambda name, each: held.append(name) if isinstance(each, h5py.Dataset) else None
@@ -152,14 +154,18 @@ def _require_filter(dataset: h5py.Dataset, path: Path) -> None:
 
 
 def by_key(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Arrays by the field that their names mean; none unless all four are there."""
-    found = {
-        field: array
-        for field, names in NAMES.items()
-        for name, array in arrays.items()
-        if name.lower() in names
-    }
-    return found if len(found) == len(NAMES) else {}
+    """Arrays by the field that their names mean; none unless all four are there.
+
+    Raises:
+        ValueError: two names mean the same field.
+    """
+    fitting = {field: [n for n in arrays if n.lower() in NAMES[field]] for field in NAMES}
+    if not all(fitting.values()):
+        return {}
+    double = next((names for names in fitting.values() if len(names) > 1), None)
+    if double:
+        raise ValueError(f"Expected one of {' and '.join(double)}, got both; keep one of them")
+    return {field: arrays[names[0]] for field, names in fitting.items()}
 
 
 def by_name(names: list[str], table: NDArray[Any]) -> dict[str, NDArray[Any]]:
@@ -179,8 +185,6 @@ def by_order(table: NDArray[Any], path: Path, order: str | None) -> dict[str, ND
     if table.ndim != 2 or table.shape[1] != 4:
         raise ValueError(f"Expected four columns in {path}, got shape {table.shape}")
     if order is not None:
-        if sorted(order) != sorted("txyp"):
-            raise ValueError(f"Expected an order of t, x, y and p, got {order!r}; set order=txyp")
         return dict(zip(order, table.T, strict=True))
     fits = [each for each in ORDERS if _fits(dict(zip(each, table.T, strict=True)))]
     if len(fits) != 1:
@@ -194,12 +198,8 @@ def by_order(table: NDArray[Any], path: Path, order: str | None) -> dict[str, ND
 def _fits(columns: Mapping[str, NDArray[Any]]) -> bool:
     """Whether columns can be what an order says: rising times, pixels, two polarities."""
     t, p = columns["t"], columns["p"]
-    pixels = all(
-        np.all(columns[name] == np.floor(columns[name])) and columns[name].min(initial=0) >= 0
-        and columns[name].max(initial=0) < 65536
-        for name in "xy"
-    )  # fmt: skip
-    return bool(pixels and np.isin(p, (-1, 0, 1)).all() and np.all(np.diff(t) >= 0))
+    pixels = _are_pixels(columns["x"]) and _are_pixels(columns["y"])
+    return bool(pixels and np.isin(p, (-1, 0, 1)).all() and np.all(t[1:] >= t[:-1]))
 
 
 def decoded(
@@ -213,31 +213,69 @@ def decoded(
     """Columns in this project's convention.
 
     Raises:
-        ValueError: the unit of the times is none, or is not known and cannot be told.
+        ValueError: the unit of the times is not known and cannot be told, or a number is none that
+            a time, a pixel or a polarity can be.
     """
+    _check(columns, path)
     t = columns["t"]
     if time_unit is None:
-        fractions = t.dtype.kind == "f" and bool(np.any(t != np.floor(t)))
-        if not fractions and len(t):
+        if len(t) and not _has_fractions(t):
             raise ValueError(
                 f"Expected to know the unit of the whole-numbered times in {path} "
                 f"({t.min():.0f} to {t.max():.0f}); set time_unit=us, ns, ms or s"
             )
         time_unit = "s"
-    if time_unit not in UNITS_US:
-        raise ValueError(
-            f"Expected a unit among {', '.join(UNITS_US)}, got {time_unit!r}; set time_unit"
-        )
-    factor = UNITS_US[time_unit]
-    times = t
-    if t.dtype.kind in "iu":  # whole numbers stay exact
-        times = t // 1000 if time_unit == "ns" else t.astype(np.int64) * int(factor)
-    else:
-        exact = t * factor
-        times = np.floor(exact + 2 * np.spacing(exact))  # what was written, past float's rounding
-    brighter = (columns["p"] > 0).astype(np.uint8)
     x, y = (columns[name].astype(np.int64) for name in "xy")
     return Decoded(
-        kind=f"{kind}, times in {time_unit}", t=times.astype(np.int64), x=x, y=y, p=brighter,
-        height=height, width=width,
+        kind=f"{kind}, times in {time_unit}", t=_microseconds(t, time_unit, path), x=x, y=y,
+        p=(columns["p"] > 0).astype(np.uint8), height=height, width=width,
     )  # fmt: skip
+
+
+def _are_pixels(values: NDArray[Any]) -> bool:
+    inside = values.min(initial=0) >= 0 and values.max(initial=0) <= LAST_PIXEL
+    return bool(inside) and not _has_fractions(values)
+
+
+def _has_fractions(values: NDArray[Any]) -> bool:
+    return values.dtype.kind == "f" and bool(np.any(values != np.floor(values)))
+
+
+def _check(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
+    """Whether every column is a row of as many numbers, pixels whole and polarities known."""
+    shapes = {name: values.shape for name, values in columns.items()}
+    kinds = {values.dtype.kind for values in columns.values()}
+    if len({*shapes.values()}) > 1 or len(shapes["t"]) != 1 or not kinds <= {*"iufb"}:
+        raise ValueError(f"Expected rows of as many numbers in {path}, got {shapes}; convert it")
+    for name in "txy":
+        values = columns[name]
+        if not np.isfinite(values).all() or (name != "t" and not _are_pixels(values)):
+            raise ValueError(
+                f"Expected finite times and whole pixels of 0 to {LAST_PIXEL} in {path}, got "
+                f"others in {name}; set order, or leave those events out"
+            )
+    if not np.isin(columns["p"], (-1, 0, 1)).all():
+        raise ValueError(
+            f"Expected polarities of 0 and 1 or -1 and 1 in {path}, got {columns['p'].min()} to "
+            f"{columns['p'].max()}; set order, or write 1 for brighter"
+        )
+
+
+def _microseconds(t: NDArray[Any], time_unit: str, path: Path) -> NDArray[np.int64]:
+    """Times of a unit, the fractions cut off."""
+    factor = UNITS_US[time_unit]
+    most = max(abs(float(t.min(initial=0))), abs(float(t.max(initial=0))))
+    if most * factor >= LATEST_US:
+        raise ValueError(
+            f"Expected times below {LATEST_US} us in {path}, got {most:g} {time_unit}; set order "
+            "or time_unit"
+        )
+    if t.dtype.kind in "iub":  # whole numbers stay exact
+        whole: NDArray[np.int64] = (
+            (t // 1000).astype(np.int64) if time_unit == "ns" else t.astype(np.int64) * int(factor)
+        )
+        return whole
+    exact = t.astype(np.float64) * factor
+    # What was written, past float's rounding.
+    below: NDArray[np.float64] = np.floor(exact + 2 * np.spacing(np.abs(exact)))
+    return below.astype(np.int64)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from eqs.commands.info import described, sketch
 from eqs.events import Events
 from eqs.events.formats import decode, is_dsec, open_events
+from eqs.events.hints import Hints
 from eqs.events.loaded import LoadedEvents
 
 HEIGHT, WIDTH = 48, 64
@@ -186,14 +187,18 @@ def test_whole_times_need_a_unit_and_two_readings_an_order(tmp_path, events):
     np.save(path, rows(events))
     with pytest.raises(ValueError, match=r"unit of the whole-numbered times in .*; set time_unit="):
         decode(path)
-    np.testing.assert_array_equal(rows(decode(path, time_unit="us").events(**SIZE)), rows(events))
+    np.testing.assert_array_equal(
+        rows(decode(path, Hints(time_unit="us")).events(**SIZE)), rows(events)
+    )
     nanoseconds = rows(events) * [1000, 1, 1, 1]
     np.save(path, nanoseconds)
-    np.testing.assert_array_equal(rows(decode(path, time_unit="ns").events(**SIZE)), rows(events))
+    np.testing.assert_array_equal(
+        rows(decode(path, Hints(time_unit="ns")).events(**SIZE)), rows(events)
+    )
     np.save(path, np.array([[0, 0, 0, 0], [1, 1, 1, 1]]))
     with pytest.raises(ValueError, match=r"fit one order in .*, got txyp and .*; set order"):
-        decode(path, time_unit="us")
-    assert decode(path, "xypt", "us").t.tolist() == [0, 1]
+        decode(path, Hints(time_unit="us"))
+    assert decode(path, Hints(order="xypt", time_unit="us")).t.tolist() == [0, 1]
 
 
 @pytest.mark.parametrize("kind", ["v2e", "mvsec", "event_utils", "m3ed", "npz", "fields"])
@@ -230,7 +235,7 @@ def test_tables_of_other_programs(tmp_path, events, kind):
 
 def test_disorder_is_sorted_stably_and_counted(tmp_path):
     np.save(tmp_path / "a.npy", np.array([[5, 1, 0, 1], [3, 2, 0, 1], [5, 3, 0, 0], [4, 4, 0, 1]]))
-    found = decode(tmp_path / "a.npy", "txyp", "us")
+    found = decode(tmp_path / "a.npy", Hints(order="txyp", time_unit="us"))
     assert found.disorder == 2
     assert found.events(**SIZE).x.tolist() == [2, 4, 1, 3]
 
