@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,26 +73,66 @@ class Decoded:
         return Events.from_arrays(**fields, height=size[0], width=size[1])
 
 
-def unwrapped(times: NDArray[np.int64], period: int) -> NDArray[np.int64]:
-    """Times of a clock that begins again, counted on: a fall of more than half of it is a turn.
+def blocks(file: BinaryIO, size: int, word: int) -> Iterator[bytes]:
+    """The rest of a file, about `size` bytes at a time, in whole words; at least one block.
+
+    What is left of a word that was cut off is left out.
 
     Example:
-        >>> unwrapped(np.array([250, 255, 3, 2, 9]), 256).tolist()
-        [250, 255, 259, 258, 265]
+        >>> from io import BytesIO
+        >>> list(blocks(BytesIO(b"abcdefg"), size=5, word=2))
+        [b'abcd', b'ef']
     """
-    steps = np.diff(times)
-    turns = (steps < -period // 2).astype(np.int64) - (steps > period // 2)
-    counted: NDArray[np.int64] = (
-        times + period * np.concatenate([[0], turns.cumsum()])[: len(times)]
-    )
-    return counted
+    whole = max(size // word, 1) * word
+    content = file.read(whole)
+    yield content[: len(content) // word * word]
+    while len(content) == whole:
+        content = file.read(whole)
+        if len(content) >= word:
+            yield content[: len(content) // word * word]
 
 
-def last_before(words: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Index of the last marked word at or before each, -1 where there is none yet.
+class Clock:
+    """Counts on the times of a clock that begins again: a fall of more than half of it is a turn.
+
+    Args:
+        period: the time after which it begins again.
 
     Example:
-        >>> last_before(np.array([False, True, False, True])).tolist()
-        [-1, 1, 1, 3]
+        >>> clock = Clock(256)
+        >>> clock.counted(np.array([250, 255, 3])).tolist()
+        [250, 255, 259]
+        >>> clock.counted(np.array([2, 9])).tolist()
+        [258, 265]
     """
-    return np.maximum.accumulate(np.where(words, np.arange(len(words)), -1))
+
+    def __init__(self, period: int) -> None:
+        """Begin before the first time."""
+        self.period = period
+        self.last: int | None = None
+        self.turned = 0
+
+    def counted(self, times: NDArray[Any]) -> NDArray[np.int64]:
+        """The next times, counted on."""
+        if not len(times):
+            return np.zeros(0, np.int64)
+        told = times.astype(np.int64)
+        steps = np.diff(told, prepend=told[0] if self.last is None else self.last)
+        turns = (steps < -self.period // 2).astype(np.int64) - (steps > self.period // 2)
+        turned = self.turned + self.period * turns.cumsum()
+        self.last, self.turned = int(told[-1]), int(turned[-1])
+        counted: NDArray[np.int64] = told + turned
+        return counted
+
+
+def joined(pieces: Iterable[Decoded], kind: str) -> Decoded:
+    """All pieces of a file as one; nothing of that kind where there is no piece."""
+    parts = list(pieces)
+    if not parts:
+        none = np.zeros(0, np.int64)
+        return Decoded(kind=kind, t=none, x=none, y=none, p=none)
+    columns = {name: [getattr(part, name) for part in parts] for name in "txyp"}
+    first, dropped = parts[0], sum(part.dropped for part in parts)
+    parts.clear()  # so that every column can go as soon as it is joined
+    held = {name: np.concatenate(columns.pop(name)) for name in "txyp"}
+    return Decoded(kind=first.kind, **held, height=first.height, width=first.width, dropped=dropped)

@@ -1,12 +1,11 @@
-"""Events as tables: text, CSV, npy and npz, and the HDF5 files of other programs."""
+"""Events as tables: npy and npz, and the HDF5 files of other programs."""
 
 from __future__ import annotations
 
-import io
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
@@ -28,47 +27,7 @@ GROUPS = ("prophesee/left", "events", "CD/events")
 ECF = 36559
 LATEST_US, LAST_PIXEL = 1 << 62, (1 << 16) - 1
 LISTED = 8
-
-
-def read_text(path: Path, hints: Hints) -> Decoded:
-    """Events of a text file or a zip of one: four numbers a line, with a header or without.
-
-    A first line of two numbers is the sensor's width and height.
-
-    Raises:
-        ValueError: the lines are no events, or fit several orders or units.
-    """
-    content = path.read_bytes()
-    if content[:4] == b"PK\x03\x04":
-        with zipfile.ZipFile(path) as archive:
-            content = archive.read(archive.namelist()[0])
-    lines = content.decode("utf-8", "replace").splitlines()
-    height = width = None
-    names: list[str] = []
-    while lines and not _numbers(lines[0], 4):
-        pair = _numbers(lines[0], 2)
-        if pair and len(lines[0].replace(",", " ").split()) == 2:
-            width, height = int(pair[0]), int(pair[1])
-        elif any(letter.isalpha() for letter in lines[0]):
-            names = lines[0].lstrip("#% ").replace(",", " ").replace(";", " ").split()
-        lines = lines[1:]
-    text = "\n".join(lines).replace(",", " ").replace(";", " ")
-    try:
-        table = (
-            np.loadtxt(io.StringIO(text), dtype=np.float64, ndmin=2) if lines else np.zeros((0, 4))
-        )
-    except ValueError as error:
-        raise ValueError(f"Expected four numbers a line in {path}, got: {error}") from error
-    columns = by_name(names, table) or by_order(table, path, hints.order)
-    return decoded(columns, path, "a text file", hints.time_unit, height, width)
-
-
-def _numbers(line: str, count: int) -> list[float]:
-    parts = line.replace(",", " ").replace(";", " ").split()[:count]
-    try:
-        return [float(part) for part in parts] if len(parts) == count else []
-    except ValueError:
-        return []
+Held = TypeVar("Held")
 
 
 def read_numpy(path: Path, hints: Hints) -> Decoded:
@@ -153,7 +112,7 @@ def _require_filter(dataset: h5py.Dataset, path: Path) -> None:
         )
 
 
-def by_key(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+def by_key(arrays: Mapping[str, Held]) -> dict[str, Held]:
     """Arrays by the field that their names mean; none unless all four are there.
 
     Raises:
@@ -168,14 +127,6 @@ def by_key(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     return {field: arrays[names[0]] for field, names in fitting.items()}
 
 
-def by_name(names: list[str], table: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Columns by the header above them; none without a header of four known names."""
-    if len(names) != table.shape[1]:
-        return {}
-    plain = [name.partition("_")[0].partition("[")[0] for name in names]  # t_us, t[us]
-    return by_key(dict(zip(plain, table.T, strict=True)))
-
-
 def by_order(table: NDArray[Any], path: Path, order: str | None) -> dict[str, NDArray[Any]]:
     """Columns by their order, which is given, or the only one that fits.
 
@@ -186,16 +137,25 @@ def by_order(table: NDArray[Any], path: Path, order: str | None) -> dict[str, ND
         raise ValueError(f"Expected four columns in {path}, got shape {table.shape}")
     if order is not None:
         return dict(zip(order, table.T, strict=True))
-    fits = [each for each in ORDERS if _fits(dict(zip(each, table.T, strict=True)))]
-    if len(fits) != 1:
+    fitting = [each for each in ORDERS if fits(dict(zip(each, table.T, strict=True)))]
+    return dict(zip(one_order(fitting, path), table.T, strict=True))
+
+
+def one_order(fitting: list[str], path: Path) -> str:
+    """The only order that fits.
+
+    Raises:
+        ValueError: none does, or several do.
+    """
+    if len(fitting) != 1:
         raise ValueError(
-            f"Expected columns that fit one order in {path}, got {' and '.join(fits) or 'none'}; "
-            "set order, for instance order=txyp"
+            f"Expected columns that fit one order in {path}, got "
+            f"{' and '.join(fitting) or 'none'}; set order, for instance order=txyp"
         )
-    return dict(zip(fits[0], table.T, strict=True))
+    return fitting[0]
 
 
-def _fits(columns: Mapping[str, NDArray[Any]]) -> bool:
+def fits(columns: Mapping[str, NDArray[Any]]) -> bool:
     """Whether columns can be what an order says: rising times, pixels, two polarities."""
     t, p = columns["t"], columns["p"]
     pixels = _are_pixels(columns["x"]) and _are_pixels(columns["y"])
@@ -219,11 +179,8 @@ def decoded(
     _check(columns, path)
     t = columns["t"]
     if time_unit is None:
-        if len(t) and not _has_fractions(t):
-            raise ValueError(
-                f"Expected to know the unit of the whole-numbered times in {path} "
-                f"({t.min():.0f} to {t.max():.0f}); set time_unit=us, ns, ms or s"
-            )
+        if len(t) and not has_fractions(t):
+            raise unit_unknown(path, t.min(), t.max())
         time_unit = "s"
     x, y = (columns[name].astype(np.int64) for name in "xy")
     return Decoded(
@@ -232,12 +189,21 @@ def decoded(
     )  # fmt: skip
 
 
+def unit_unknown(path: Path, least: float, most: float) -> ValueError:
+    """The sentence about times whose unit cannot be told."""
+    return ValueError(
+        f"Expected to know the unit of the whole-numbered times in {path} ({least:.0f} to "
+        f"{most:.0f}); set time_unit=us, ns, ms or s"
+    )
+
+
 def _are_pixels(values: NDArray[Any]) -> bool:
     inside = values.min(initial=0) >= 0 and values.max(initial=0) <= LAST_PIXEL
-    return bool(inside) and not _has_fractions(values)
+    return bool(inside) and not has_fractions(values)
 
 
-def _has_fractions(values: NDArray[Any]) -> bool:
+def has_fractions(values: NDArray[Any]) -> bool:
+    """Whether a number is none of the whole ones."""
     return values.dtype.kind == "f" and bool(np.any(values != np.floor(values)))
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from eqs.events.decoded import joined
 from eqs.events.formats import decode
 from eqs.events.ros import arrays, packets
 
@@ -48,7 +49,7 @@ def packet(encoding, events, ros1, base_ns=0, frame=b"camera"):
 
 
 def rows(found):
-    events = found.events()
+    events = joined(found, "none").events()
     return list(zip(*(getattr(events, name).tolist() for name in "txyp"), strict=True))
 
 
@@ -64,7 +65,7 @@ def test_arrays_of_events(ros1, frame):
             for value, size in ((x, 2), (y, 2), (t // 10**6, 4), (t % 10**6 * 1000, 4), (p, 1)):
                 writer.number(value, size)
         messages.append(bytes(writer.content))
-    assert rows(arrays(iter(messages), Path("a"), ros1=ros1)) == EVENTS
+    assert rows(arrays(iter(messages), ros1=ros1)) == EVENTS
 
 
 @pytest.mark.parametrize("ros1", [True, False])
@@ -97,11 +98,35 @@ def test_words_of_evt3_go_on_from_packet_to_packet():
 
 
 def test_encodings_that_are_not_read_are_named():
-    message = packet(b"libcaer_cmp", b"1234", False)
-    with pytest.raises(ValueError, match=r"evt3, mono or libcaer in a, got libcaer_cmp; convert"):
-        packets(iter([message]), Path("a"), ros1=False)
+    message = packet(b"trigger", b"1234", False)
+    with pytest.raises(ValueError, match=r"libcaer_cmp, mono in a, got trigger; convert"):
+        list(packets(iter([message]), Path("a"), ros1=False))
     with pytest.raises(ValueError, match="got one that was cut off"):
-        packets(iter([message[:20]]), Path("a"), ros1=False)
+        list(packets(iter([message[:20]]), Path("a"), ros1=False))
+
+
+@pytest.mark.parametrize("ros1", [True, False])
+def test_compressed_libcaer_counts_from_the_packet_s_base(ros1):
+    high, low, column, row, first_row, eight = (kind << 12 for kind in range(6))
+    words = [
+        [column | 9, low | 5, row | 1 << 11 | 7, high | 1, low | 2, row | 8],
+        # The column is that of the packet before; a mask moves its first row on.
+        [first_row | 1 << 11 | 20, eight | 0b10000001, eight | 1, row | 3],
+    ]
+    messages = [
+        packet(b"libcaer_cmp", np.array(part, "<u2").tobytes(), ros1, base_ns=base)
+        for part, base in zip(words, (1_000_999, 9_000_000), strict=True)
+    ]
+    assert rows(packets(iter(messages), Path("a"), ros1=ros1)) == [
+        (1005, 9, 7, 1), (1000 + 4098, 9, 8, 0),
+        (9000, 9, 20, 1), (9000, 9, 27, 1), (9000, 9, 28, 1), (9000, 9, 3, 0),
+    ]  # fmt: skip
+
+
+def test_events_before_the_first_column_are_dropped():
+    words = np.array([3 << 12 | 7, 2 << 12 | 1, 3 << 12 | 7], "<u2").tobytes()
+    found = joined(packets(iter([packet(b"libcaer_cmp", words, False)]), Path("a"), ros1=False), "")
+    assert (found.dropped, len(found.t)) == (1, 1)
 
 
 @pytest.mark.parametrize("start", [b"#ROSBAG V2.0\n", b"SQLite format 3\0", b"\x89MCAP0\r\n"])
