@@ -1,16 +1,16 @@
-"""Time the simulators, the score, or the detector against the same function computed plainly."""
+"""Time the simulators, the score, long event files, or the detector against a plain one."""
 
 import argparse
 import sys
 from pathlib import Path
 
-from benchmarks import rvt, scoring, simulators
+from benchmarks import event_files, rvt, scoring, simulators
 
 
 def main() -> None:
     """Print one table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["simulators", "rvt", "eqs"])
+    parser.add_argument("what", choices=["simulators", "rvt", "eqs", "files"])
     clip = parser.add_argument_group("simulators and eqs")
     clip.add_argument("--frames", type=int, help="60 for simulators, 300 windows for eqs")
     clip.add_argument("--size", default="640x480", help="width and height")
@@ -22,7 +22,11 @@ def main() -> None:
         default=simulators.NAMES,
         help="some simulators",
     )
+    parser.add_argument("--events", type=int, default=100, help="files: millions of events")
     given = parser.parse_args()
+    if given.what == "files":
+        event_files.print_table(given.events * 1_000_000)
+        return
     if given.what == "rvt":
         rvt.print_table()
         return

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 
+from rich.console import Console
+from rich.progress import track
+
 from eqs.events import Events
-from eqs.events.formats import decode, is_dsec
 from eqs.events.hints import UNITS_US, Hints
+from eqs.events.ordered import HELD, OrderedFile
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
@@ -19,17 +23,35 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--first-pixel", type=int, choices=[0, 1], help="first row and column in a MATLAB file"
     )
+    parser.add_argument(
+        "--whole",
+        action="store_true",
+        help=f"hold all of the file, to sort events that come more than {HELD} places late",
+    )
 
 
-def read(path: Path, given: argparse.Namespace) -> tuple[str, int, int, Events]:
-    """What a file is, how many of its events were out of order or dropped, and the stream.
+def hints(given: argparse.Namespace) -> Hints:
+    """What the command line says about the file.
 
     Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is of no known kind, damaged, or fits several readings.
+        ValueError: it says what no file can be.
     """
-    if is_dsec(path):
-        return "HDF5 in the layout of DSEC", 0, 0, Events.load(path, given.height, given.width)
     names = ("height", "width", "order", "time_unit", "first_pixel")
-    found = decode(path, Hints(**{name: getattr(given, name) for name in names}))
-    return found.kind, found.disorder, found.dropped, found.events(given.height, given.width)
+    return Hints(**{name: getattr(given, name) for name in names})
+
+
+def opened(path: Path, given: argparse.Namespace) -> OrderedFile:
+    """The file, to be read piece by piece.
+
+    Raises:
+        ValueError: the command line says what no file can be.
+    """
+    return OrderedFile(path, hints(given), None if given.whole else HELD)
+
+
+def with_progress(pieces: Iterator[Events], what: str) -> Iterator[Events]:
+    """The pieces, with a sign of life on a terminal while they pass."""
+    console = Console(stderr=True)
+    return iter(
+        track(pieces, what, console=console, transient=True, disable=not console.is_terminal)
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -39,7 +39,31 @@ class Decoded:
     @property
     def disorder(self) -> int:
         """Events that come after a later one."""
-        return int((self.t < np.maximum.accumulate(self.t)).sum()) if len(self.t) else 0
+        return self.late(None)
+
+    def late(self, newest: int | None) -> int:
+        """Events that come after a later one, these or one of those before.
+
+        Args:
+            newest: the latest time before these; None where they are the first.
+        """
+        if not len(self.t):
+            return 0
+        if bool((self.t[1:] >= self.t[:-1]).all()) and (newest is None or newest <= self.t[0]):
+            return 0
+        latest = np.maximum.accumulate(self.t)
+        return int((self.t < (latest if newest is None else np.maximum(latest, newest))).sum())
+
+    def sorted(self) -> Decoded:
+        """The same events by time; equal times keep the file's order."""
+        if not self.disorder:
+            return self
+        order = np.argsort(self.t, kind="stable")
+        return replace(self, **{name: getattr(self, name)[order] for name in "txyp"})
+
+    def __getitem__(self, index: slice) -> Decoded:
+        """The events at a slice of places, as views."""
+        return replace(self, **{name: getattr(self, name)[index] for name in "txyp"})
 
     def events(self, height: int | None = None, width: int | None = None) -> Events:
         """The stream, sorted by time; equal times keep the file's order.
@@ -66,10 +90,8 @@ class Decoded:
                     f"{name} out"
                 )
             size.append(int(stored if stored is not None else given or 0))
-        fields = {name: getattr(self, name) for name in "txyp"}
-        if self.disorder:
-            order = np.argsort(self.t, kind="stable")
-            fields = {name: values[order] for name, values in fields.items()}
+        part = self.sorted()
+        fields = {name: getattr(part, name) for name in "txyp"}
         return Events.from_arrays(**fields, height=size[0], width=size[1])
 
 
@@ -131,6 +153,8 @@ def joined(pieces: Iterable[Decoded], kind: str) -> Decoded:
     if not parts:
         none = np.zeros(0, np.int64)
         return Decoded(kind=kind, t=none, x=none, y=none, p=none)
+    if len(parts) == 1:
+        return parts[0]
     columns = {name: [getattr(part, name) for part in parts] for name in "txyp"}
     first, dropped = parts[0], sum(part.dropped for part in parts)
     parts.clear()  # so that every column can go as soon as it is joined

@@ -45,7 +45,7 @@ def read_text(path: Path, size: int, hints: Hints) -> Iterator[Decoded]:
     places = head.places() or _in_order(hints.order or "")
     if not head.columns and not head.places():
         raise ValueError(f"Expected four numbers a line in {path}, got none; convert it")
-    survey = Survey(head.columns)
+    survey = Survey(head.columns or len(head.names))
     for lines in _lines(path, size, head.lines):
         survey.add(lines, path, numbers=not (places and hints.time_unit))
         if places and survey.fractions[places["t"]] and not survey.whole:
@@ -53,9 +53,8 @@ def read_text(path: Path, size: int, hints: Hints) -> Iterator[Decoded]:
     places = places or _in_order(one_order(survey.orders, path))
     unit = hints.time_unit or survey.unit(places["t"], path)
     kind = np.dtype(np.int64 if survey.whole else np.float64)
-    empty: list[str] = []
-    for lines in _lines(path, size, head.lines) if head.columns else [empty]:
-        table = _table(lines, head.columns, kind, path)
+    for lines in _lines(path, size, head.lines):
+        table = _table(lines, head.columns or len(head.names), kind, path)
         named = {name: table[:, place] for name, place in places.items()}
         yield decoded(named, path, "a text file", unit, head.height, head.width)
 
@@ -152,7 +151,7 @@ class Survey:
         Raises:
             ValueError: they have none.
         """
-        if len(self.fractions) and not self.fractions[place]:
+        if np.isfinite(self._least[place]) and not self.fractions[place]:
             raise unit_unknown(path, self._least[place], self._most[place])
         return "s"
 
@@ -161,7 +160,7 @@ def _table(lines: list[str], columns: int, kind: np.dtype[Any], path: Path) -> N
     """The numbers of some lines."""
     lines = [line for line in lines if not line.lstrip().startswith("#")]
     if not lines:
-        return np.zeros((0, max(columns, len("txyp"))), kind)
+        return np.zeros((0, columns), kind)
     try:
         table = np.loadtxt(io.StringIO("\n".join(lines)), dtype=kind, ndmin=2)
     except (ValueError, OverflowError) as error:
