@@ -1,4 +1,4 @@
-"""AEDAT files of iniVation's cameras and of jAER: versions 2, 3.1 and 4.
+"""AEDAT files of iniVation's cameras and of jAER: versions 2 and 3.1.
 
 Source: the published descriptions of the formats.
 """
@@ -15,7 +15,6 @@ import numpy as np
 
 from eqs.events.decoded import Clock, Decoded, blocks
 from eqs.events.hints import Hints
-from eqs.extras import needed
 
 # Sensors by the name of jAER's chip class.
 CHIPS = {
@@ -172,51 +171,3 @@ def _valid(content: bytes, overflow: int) -> Decoded:
         kind="an AEDAT 3.1 file", t=(overflow << 31) + pairs[:, 1].astype(np.int64),
         x=data >> 17, y=data >> 2 & 0x7FFF, p=data >> 1 & 1,
     )  # fmt: skip
-
-
-def read_aedat4(path: Path) -> Iterator[Decoded]:
-    """Events of the first event stream of an AEDAT 4 file.
-
-    Raises:
-        ValueError: the file holds none, or the optional dependency `aedat4` is not installed.
-    """
-    decoder = open_aedat4(path)
-    streams = decoder.id_to_stream()
-    chosen = [number for number, stream in streams.items() if stream["type"] == "events"]
-    if not chosen:
-        raise ValueError(f"Expected a stream of events in {path}, got {streams}")
-    size = streams[chosen[0]]
-    for packet in packets_of(decoder, path):
-        if packet["stream_id"] == chosen[0] and "events" in packet:
-            events = packet["events"]
-            yield Decoded(
-                kind="an AEDAT 4 file", t=events["t"].astype(np.int64), x=events["x"],
-                y=events["y"], p=events["p"].astype(np.uint8), height=int(size["height"]),
-                width=int(size["width"]),
-            )  # fmt: skip
-
-
-def open_aedat4(path: Path) -> Any:  # noqa: ANN401 - the library's own type
-    """A decoder of an AEDAT 4 file.
-
-    Raises:
-        ValueError: the file is damaged, or the optional dependency `aedat4` is not installed.
-    """
-    with needed("aedat4", f"to read {path}"):
-        import aedat
-    try:
-        return aedat.Decoder(str(path))
-    except RuntimeError as error:
-        raise ValueError(f"Expected a whole AEDAT 4 file at {path}, got: {error}") from error
-
-
-def packets_of(decoder: Any, path: Path) -> Iterator[dict[str, Any]]:  # noqa: ANN401
-    """The packets of an AEDAT 4 file.
-
-    Raises:
-        ValueError: one is damaged.
-    """
-    try:
-        yield from decoder
-    except RuntimeError as error:
-        raise ValueError(f"Expected a whole AEDAT 4 file at {path}, got: {error}") from error

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import h5py
 
-from eqs.events.aedat import read_aedat2, read_aedat3, read_aedat4
+from eqs.events.aedat import read_aedat2, read_aedat3
+from eqs.events.aedat4 import read_aedat4
 from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
 from eqs.events.decoded import Decoded, joined
+from eqs.events.hdf5 import DAMAGE
 from eqs.events.hints import NOTHING_SAID, Hints
 from eqs.events.loaded import LoadedEvents
 from eqs.events.matlab import read_matlab
@@ -55,7 +57,7 @@ def is_dsec(path: Path) -> bool:
     try:
         with h5py.File(path) as file:
             return "ms_to_idx" in file
-    except OSError:
+    except DAMAGE:
         return True  # whose reader says what is wrong
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.clock import backwards
+from eqs.events.hdf5 import require_stored, whole_hdf5
 from eqs.events.stream import FIELDS, as_field
 
 LOOKED_AT_ONCE = 10_000_000  # events
@@ -33,6 +34,8 @@ class Handles:
             self.offset_us = 0
             if "t_offset" in self.file:
                 self.offset_us = _whole_number(self.file["t_offset"], f"t_offset in {path}")
+            for column in (*self.columns.values(), self.file["ms_to_idx"]):
+                require_stored(column, path)
             self.index = self.file["ms_to_idx"][:].astype(np.int64)
             self._check_index(path)
             self.height = self._side(path, "height", height)
@@ -43,11 +46,10 @@ class Handles:
                 self.stop_us += int(self.columns["t"][-1]) + 1
             self._check_times(path)
             self.span_us = self._span(path)
-        except BaseException as error:
+        except BaseException:
             self.file.close()
-            if isinstance(error, OSError):  # a chunk that cannot be read
-                raise ValueError(f"{path}: {error}; replace the damaged file") from error
-            raise
+            with whole_hdf5(path):  # a chunk that cannot be read
+                raise
 
     def times(self, start: int, stop: int) -> tuple[int, NDArray[np.int64]]:
         """Index of the first event in [start, stop) and the times of all of them.

@@ -7,20 +7,24 @@ polarity of 1 without any 2 is brighter.
 
 from __future__ import annotations
 
+import io
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events.decoded import Decoded
+from eqs.events.hdf5 import require_stored, whole_hdf5
 from eqs.events.hints import Hints
 from eqs.events.tables import by_key, by_order, decoded
 
 WITH_HDF5 = b"MATLAB 7.3"
 DEEPEST = 4  # structs in structs
+HEADER, TAG, COMPRESSED = 128, 8, 15  # of version 5: bytes, and the kind of a variable
 
 
 def read_matlab(path: Path, hints: Hints) -> Decoded:
@@ -32,10 +36,7 @@ def read_matlab(path: Path, hints: Hints) -> Decoded:
     """
     with path.open("rb") as file:
         hdf5 = file.read(len(WITH_HDF5)) == WITH_HDF5
-    try:
-        variables = _variables_of_hdf5(path) if hdf5 else _variables(path)
-    except Exception as error:  # the libraries raise whatever a damaged file leads them to
-        raise ValueError(f"Expected a whole MATLAB file at {path}, got: {error}") from error
+    variables = _variables_of_hdf5(path) if hdf5 else _variables(path)
     structs = [(name, found) for name, each in _structs("", variables) if (found := by_key(each))]
     tables = [each for _, held in _structs("", variables) for each in held.values()]
     tables = [each for each in tables if isinstance(each, np.ndarray) and _is_table(each)]
@@ -56,22 +57,44 @@ def _variables(path: Path) -> dict[str, Any]:
     """Variables of version 5, structs as dictionaries."""
     from scipy.io import loadmat
 
-    found = loadmat(path, simplify_cells=True)
+    try:
+        unpacked: Any = _unpacked(path.read_bytes())
+        found = loadmat(unpacked, simplify_cells=True)
+    except Exception as error:  # the library raises whatever damage leads it to
+        raise ValueError(f"Expected a whole MATLAB file at {path}, got: {error}") from error
     return {name: value for name, value in found.items() if not name.startswith("__")}
+
+
+def _unpacked(content: bytes) -> io.BytesIO:
+    """The file with its compressed variables unpacked.
+
+    From those the library takes as much memory as they say they need, damaged or not.
+    """
+    order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
+    parts, at = [content[:HEADER]], HEADER
+    while at + TAG <= len(content):
+        kind, size = (int.from_bytes(content[at + k : at + k + 4], order) for k in (0, 4))
+        body = content[at : at + TAG + size]
+        parts.append(zlib.decompress(body[TAG:]) if kind == COMPRESSED else body)
+        at += TAG + size
+    return io.BytesIO(b"".join(parts))
 
 
 def _variables_of_hdf5(path: Path) -> dict[str, Any]:
     """Variables of version 7.3, which stores the transpose of each."""
-    with h5py.File(path) as file:
-        return _held(file)
+    with whole_hdf5(path), h5py.File(path) as file:
+        return _held(file, path)
 
 
-def _held(group: h5py.Group) -> dict[str, Any]:
-    return {
-        name: _held(each) if isinstance(each, h5py.Group) else each[()].T
-        for name, each in group.items()
-        if not name.startswith("#") and (isinstance(each, h5py.Group) or each.dtype.kind in "iufb")
-    }
+def _held(group: h5py.Group, path: Path) -> dict[str, Any]:
+    held: dict[str, Any] = {}
+    for name, each in group.items():
+        if isinstance(each, h5py.Group) and not name.startswith("#"):
+            held[name] = _held(each, path)
+        elif isinstance(each, h5py.Dataset) and each.dtype.kind in "iufb":
+            require_stored(each, path)
+            held[name] = each[()].T
+    return held
 
 
 def _structs(name: str, held: Mapping[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]:
@@ -101,7 +124,7 @@ def _from_zero(
     found = {
         name: values.astype(values.dtype.newbyteorder("=")) for name, values in columns.items()
     }
-    twos = len(found["p"]) > 0 and int(found["p"].max()) == 2 and int(found["p"].min()) >= 1
+    twos = len(found["p"]) > 0 and found["p"].max() == 2 and found["p"].min() >= 1
     if twos:
         found["p"] = found["p"] - 1
     first = hints.first_pixel
@@ -119,6 +142,6 @@ def _first_pixel(x: NDArray[Any], y: NDArray[Any], path: Path, hints: Hints, *, 
     if twos or x.max() == hints.width or y.max() == hints.height:
         return 1
     raise ValueError(
-        f"Expected to know whether rows and columns in {path} count from 0 or from 1 (they begin "
-        f"at {x.min():.0f} and {y.min():.0f}); set first_pixel=0 or 1"
+        f"Expected to know whether rows and columns in {path} count from 0 or from 1, got columns "
+        f"from {x.min():.0f} and rows from {y.min():.0f}; set first_pixel=0 or 1"
     )

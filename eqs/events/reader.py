@@ -138,7 +138,7 @@ class EventReader:
             rows = slice(first, first + len(t))
             fields: dict[str, Any] = {k: as_field(k, file.columns[k][rows]) for k in "xyp"}
             events = Events(t + file.offset_us, **fields, height=file.height, width=file.width)
-        except (OSError, ValueError) as error:
+        except (OSError, RuntimeError, ValueError) as error:
             raise ValueError(f"{self.path}: {error}") from error
         return events if self.height == file.height else _top_rows(events, self.height)
 

@@ -6,13 +6,15 @@ serialisation rules of ROS 1 and of CDR.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from eqs.events.bounded import BoundedPath
 from eqs.events.decoded import Clock, Decoded
 from eqs.events.words import Arrays, evt3, libcaer_cmp, untold
 from eqs.extras import needed
@@ -67,36 +69,82 @@ class Message:
         return self.number(4), self.number(4)
 
 
+class Bag:
+    """A bag, open in the block: its topics, and the bytes of their messages.
+
+    Args:
+        path: the file.
+
+    Raises:
+        ValueError: the bag is damaged, or rosbags, the optional dependency `ros`, is not installed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Find out of which version it is."""
+        self.path = path
+        with path.open("rb") as file:
+            self.ros1 = file.read(len(ROS1)) == ROS1
+
+    def __enter__(self) -> Self:
+        """Open the bag."""
+        with needed("ros", f"to read {self.path}"):
+            from rosbags.rosbag1 import Reader as Reader1
+            from rosbags.rosbag2 import Reader as Reader2
+        with self._whole():
+            self._reader = (Reader1 if self.ros1 else Reader2)(BoundedPath(self.path))
+            self._reader.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the bag."""
+        self._reader.close()
+
+    def topics(self, kinds: Collection[str]) -> list[Any]:
+        """The topics of these kinds of messages."""
+        return [each for each in self._reader.connections if each.msgtype in kinds]
+
+    def listed(self) -> str:
+        """All topics and their kinds."""
+        return ", ".join(f"{each.topic} ({each.msgtype})" for each in self._reader.connections)
+
+    def messages(self, topic: Any) -> Iterator[bytes]:  # noqa: ANN401 - the library's own type
+        """The bytes of a topic's messages."""
+        with self._whole():
+            found = self._reader.messages(connections=[topic])
+        while True:
+            with self._whole():
+                message = next(found, None)
+            if message is None:
+                return
+            yield bytes(message[2])
+
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:  # the library raises whatever damage leads it to
+            raise ValueError(f"Expected a whole bag at {self.path}, got: {error}") from error
+
+
 def read_bag(path: Path) -> Iterator[Decoded]:
     """Events of the only topic with events in a bag.
 
     Raises:
-        ValueError: there is none, or there are several, or their encoding is not read here; or
-            rosbags, the optional dependency `ros`, is not installed.
+        ValueError: there is none, or there are several, or their encoding is not read here, or the
+            bag is damaged; or rosbags, the optional dependency `ros`, is not installed.
     """
-    with needed("ros", f"to read {path}"):
-        from rosbags.rosbag1 import Reader as Reader1
-        from rosbags.rosbag1 import ReaderError as Error1
-        from rosbags.rosbag2 import Reader as Reader2
-        from rosbags.rosbag2 import ReaderError as Error2
-    with path.open("rb") as file:
-        ros1 = file.read(len(ROS1)) == ROS1
-    try:
-        with (Reader1 if ros1 else Reader2)(path) as reader:
-            found = [c for c in reader.connections if c.msgtype in (*PACKET, *ARRAY)]
-            if len(found) != 1:
-                held = ", ".join(f"{c.topic} ({c.msgtype})" for c in reader.connections)
-                raise ValueError(
-                    f"Expected one topic of events ({', '.join((*PACKET, *ARRAY))}) in {path}, "
-                    f"got {held or 'none'}; write the one that is meant into a bag of its own"
-                )
-            messages = (bytes(raw) for _, _, raw in reader.messages(connections=found))
-            if found[0].msgtype in PACKET:
-                yield from packets(messages, path, ros1=ros1)
-            else:
-                yield from arrays(messages, ros1=ros1)
-    except (Error1, Error2) as error:
-        raise ValueError(f"Expected a whole bag at {path}, got: {error}") from error
+    with Bag(path) as bag:
+        found = bag.topics((*PACKET, *ARRAY))
+        if len(found) != 1:
+            raise ValueError(
+                f"Expected one topic of events ({', '.join((*PACKET, *ARRAY))}) in {path}, "
+                f"got {bag.listed() or 'none'}; write the one that is meant into a bag of its own"
+            )
+        messages = bag.messages(found[0])
+        if found[0].msgtype in PACKET:
+            yield from packets(messages, path, ros1=bag.ros1)
+        else:
+            yield from arrays(messages, ros1=bag.ros1)
 
 
 def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Iterator[Decoded]:

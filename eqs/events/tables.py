@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import Any, TypeVar
 
 import h5py
 import numpy as np
+from numpy.lib import format as headers
 from numpy.typing import NDArray
 
 from eqs.events.decoded import Decoded
+from eqs.events.hdf5 import require_stored, whole_hdf5
 from eqs.events.hints import UNITS_US, Hints
 
 NAMES = {
@@ -25,6 +30,10 @@ ORDERS = ("txyp", "xytp", "xypt", "tpxy", "pxyt")
 COLUMNS = {"davis/left/events": ("xytp", "s"), "events": ("txyp", "us")}
 GROUPS = ("prophesee/left", "events", "CD/events")
 ECF = 36559
+ZIP = b"PK\x03\x04"
+# What reading a zip may raise where the file does not hold what it says.
+DAMAGED_ARRAY = (ValueError, OSError, SyntaxError, TypeError, tokenize.TokenError)
+DAMAGED_ZIP = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError)
 LATEST_US, LAST_PIXEL = 1 << 62, (1 << 16) - 1
 LISTED = 8
 Held = TypeVar("Held")
@@ -36,19 +45,26 @@ def read_numpy(path: Path, hints: Hints) -> Decoded:
     Raises:
         ValueError: it holds something else, or fits several orders or units.
     """
+    with path.open("rb") as file:
+        zipped = file.read(len(ZIP)) == ZIP
     try:
-        found = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        found: Any = _arrays(path) if zipped else np.load(path, "r", allow_pickle=False)
+    except (
+        *DAMAGED_ZIP,
+        ValueError,
+        OSError,
+        SyntaxError,
+        TypeError,
+        tokenize.TokenError,
+    ) as error:
         raise ValueError(f"Expected arrays of events in {path}, got: {error}") from error
-    if isinstance(found, np.lib.npyio.NpzFile):
-        with found:
-            arrays = {name: found[name] for name in found.files}
-        named = by_key(arrays)
+    if zipped:
+        named = by_key(found)
         if named:
             return decoded(named, path, "an npz file", hints.time_unit)
-        tables = [each for each in arrays.values() if each.ndim == 2 or each.dtype.names]
+        tables = [each for each in found.values() if each.ndim == 2 or each.dtype.names]
         if len(tables) != 1:
-            raise ValueError(f"Expected one table of events in {path}, got {sorted(arrays)}")
+            raise ValueError(f"Expected one table of events in {path}, got {sorted(found)}")
         found = tables[0]
     if found.dtype.names:
         named = by_key({name: found[name] for name in found.dtype.names})
@@ -63,31 +79,39 @@ def read_numpy(path: Path, hints: Hints) -> Decoded:
     return decoded(columns, path, "a numpy file", hints.time_unit)
 
 
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays of an npz file, each no larger than what is stored of it."""
+    arrays = {}
+    with zipfile.ZipFile(path) as archive:
+        for info in archive.infolist():
+            with archive.open(info) as member:
+                version = headers.read_magic(member)
+                first = version == (1, 0)
+                read = headers.read_array_header_1_0 if first else headers.read_array_header_2_0
+                shape, _, kind = read(member)
+                if prod(shape) * kind.itemsize > info.file_size:
+                    raise ValueError(f"{info.filename} says more than it holds")
+            with archive.open(info) as member:
+                name = info.filename.removesuffix(".npy")
+                arrays[name] = headers.read_array(member, allow_pickle=False)
+    return arrays
+
+
 def read_foreign_hdf5(path: Path, hints: Hints) -> Decoded:
     """Events of an HDF5 file of v2e, MVSEC, event_utils, M3ED or Metavision.
 
     Raises:
         ValueError: it is none of these, or compressed by a filter that cannot be had.
     """
-    with h5py.File(path) as file:
+    with whole_hdf5(path), h5py.File(path) as file:
         for place, (order, unit) in COLUMNS.items():
             found = file.get(place)
             if isinstance(found, h5py.Dataset) and found.ndim == 2 and found.shape[1] == 4:
+                require_stored(found, path)
                 columns = dict(zip(order, found[:].T, strict=True))
                 return decoded(columns, path, f"an HDF5 file ({place})", hints.time_unit or unit)
         for place in GROUPS:
-            group = file.get(place)
-            if isinstance(group, h5py.Dataset) and group.dtype.names:
-                _require_filter(group, path)
-                table = group[:]
-                arrays = {name: table[name] for name in table.dtype.names}
-            elif isinstance(group, h5py.Group):
-                arrays = {
-                    n: d[:] for n, d in group.items() if isinstance(d, h5py.Dataset) and d.ndim == 1
-                }
-            else:
-                continue
-            named = by_key(arrays)
+            named = by_key(_columns(file.get(place), path))
             if named:
                 unit = "s" if named["t"].dtype.kind == "f" else "us"
                 return decoded(named, path, f"an HDF5 file ({place})", hints.time_unit or unit)
@@ -96,10 +120,29 @@ def read_foreign_hdf5(path: Path, hints: Hints) -> Decoded:
             lambda name, each: held.append(name) if isinstance(each, h5py.Dataset) else None
         )
         shown = ", ".join(held[:LISTED]) or "nothing"
-        raise ValueError(
-            f"Expected the events of DSEC (events/x, y, p, t and ms_to_idx), v2e, MVSEC, "
-            f"event_utils, M3ED or Metavision in {path}, got {shown}; convert it"
-        )
+    raise ValueError(
+        f"Expected the events of DSEC (events/x, y, p, t and ms_to_idx), v2e, MVSEC, "
+        f"event_utils, M3ED or Metavision in {path}, got {shown}; convert it"
+    )
+
+
+def _columns(found: object, path: Path) -> dict[str, NDArray[Any]]:
+    """The rows of numbers in a group, or the fields of a table."""
+    if isinstance(found, h5py.Dataset) and found.dtype.names:
+        _require_filter(found, path)
+        require_stored(found, path)
+        table = found[:]
+        return {name: table[name] for name in table.dtype.names}
+    if not isinstance(found, h5py.Group):
+        return {}
+    rows = {
+        name: each
+        for name, each in found.items()
+        if isinstance(each, h5py.Dataset) and each.ndim == 1
+    }
+    for each in rows.values():
+        require_stored(each, path)
+    return {name: each[:] for name, each in rows.items()}
 
 
 def _require_filter(dataset: h5py.Dataset, path: Path) -> None:
@@ -192,8 +235,8 @@ def decoded(
 def unit_unknown(path: Path, least: float, most: float) -> ValueError:
     """The sentence about times whose unit cannot be told."""
     return ValueError(
-        f"Expected to know the unit of the whole-numbered times in {path} ({least:.0f} to "
-        f"{most:.0f}); set time_unit=us, ns, ms or s"
+        f"Expected to know the unit of the whole-numbered times in {path}, got {least:.0f} to "
+        f"{most:.0f} of any; set time_unit=us, ns, ms or s"
     )
 
 

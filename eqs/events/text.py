@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +17,9 @@ from numpy.typing import NDArray
 from eqs.events.decoded import Decoded, blocks
 from eqs.events.hints import Hints
 from eqs.events.tables import (
+    DAMAGED_ZIP,
     ORDERS,
+    ZIP,
     by_key,
     decoded,
     fits,
@@ -27,7 +28,6 @@ from eqs.events.tables import (
     unit_unknown,
 )
 
-ZIP = b"PK\x03\x04"
 LONGEST_LINE = 1 << 16
 NO_WHOLE_NUMBER = re.compile(r"[.a-zA-Z]")
 
@@ -204,7 +204,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
     try:
         with zipfile.ZipFile(path) as archive, archive.open(_member(archive, path)) as member:
             yield member  # type: ignore[misc]
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except DAMAGED_ZIP as error:
         raise ValueError(f"Expected a whole zip at {path}, got: {error}") from error
 
 

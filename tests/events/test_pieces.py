@@ -9,6 +9,7 @@ from event_files import (
     ENCODERS,
     HEIGHT,
     SIZE,
+    TOLD,
     WIDTH,
     aedat2,
     aedat2_of_v2e,
@@ -29,7 +30,6 @@ MADE = {
     **ENCODERS, "g.aedat": aedat2, "h.aedat": aedat2_of_v2e, "i.bin": forty_bits, "j.txt": text,
     "k.csv": csv,
 }  # fmt: skip
-TOLD = {"h.aedat": {"height": 180, "width": 240}, "k.csv": {"time_unit": "us"}}
 
 
 def stream(count, stop_us=90_000, start_us=1_000_000, seed=0):

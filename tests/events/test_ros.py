@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from event_files import Serialised, packet
 
 from eqs.events.decoded import joined
 from eqs.events.formats import decode
@@ -11,41 +12,6 @@ from eqs.events.ros import arrays, packets
 
 EVENTS = [(1_700_000_000_123_456, 5, 7, 1), (1_700_000_000_123_457, 600, 479, 0),
           (1_700_000_001_000_000, 0, 0, 1)]  # fmt: skip
-
-
-class Writer:
-    """Puts fields behind each other, aligned as CDR wants it, or not."""
-
-    def __init__(self, ros1):
-        self.ros1, self.content = ros1, bytearray() if ros1 else bytearray(b"\0\1\0\0")
-
-    def number(self, value, size):
-        if not self.ros1:
-            self.content += bytes(-(len(self.content) - 4) % size)
-        self.content += int(value).to_bytes(size, "little")
-
-    def bytes(self, value, zero=False):
-        value += b"\0" if zero and not self.ros1 else b""
-        self.number(len(value), 4)
-        self.content += value
-
-    def header(self, frame):
-        for _ in range(3 if self.ros1 else 2):
-            self.number(1, 4)
-        self.bytes(frame, zero=True)
-        self.number(480, 4)
-        self.number(640, 4)
-
-
-def packet(encoding, events, ros1, base_ns=0, frame=b"camera"):
-    writer = Writer(ros1)
-    writer.header(frame)
-    writer.number(1, 8)
-    writer.number(base_ns, 8)
-    writer.bytes(encoding, zero=True)
-    writer.number(0, 1)
-    writer.bytes(events)
-    return bytes(writer.content)
 
 
 def rows(found):
@@ -58,7 +24,7 @@ def rows(found):
 def test_arrays_of_events(ros1, frame):
     messages = []
     for part in (EVENTS[:2], [], EVENTS[2:]):
-        writer = Writer(ros1)
+        writer = Serialised(ros1)
         writer.header(frame)
         writer.number(len(part), 4)
         for t, x, y, p in part:
