@@ -1,4 +1,4 @@
-"""Time the simulators, the score, reading for a training, or the detector against plain code."""
+"""Time simulators, score, detector, event files, or reading for a training, on this machine."""
 
 from eqs.commands import run
 

@@ -1,4 +1,4 @@
-"""Time the simulators, the score, reading for a training, or the detector against plain code."""
+"""Time simulators, score, detector, event files, or reading for a training, on this machine."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from eqs.benchmarks import reading, rvt, scoring, simulators
+from eqs.benchmarks import event_files, reading, rvt, scoring, simulators
 
 
 def main(arguments: Sequence[str], shown: str) -> None:
     """Read the command line and print one table."""
     parser = argparse.ArgumentParser(prog=shown, description=__doc__)
-    parser.add_argument("what", choices=["simulators", "rvt", "eqs", "data"])
+    parser.add_argument("what", choices=["simulators", "rvt", "eqs", "data", "files"])
     clip = parser.add_argument_group("simulators, eqs and data")
     clip.add_argument("--frames", type=int, help="60 for simulators, 300 windows for eqs")
     clip.add_argument("--size", default="640x480", help="width and height")
     clip.add_argument("--clip", type=Path, help="simulators: a folder of images, taken as 20 Hz")
-    clip.add_argument("--events", type=float, default=60e6, help="data: in the whole recording")
+    clip.add_argument("--events", type=float, default=60e6, help="data, files: in a recording")
     clip.add_argument(
         "--only",
         nargs="*",
@@ -38,6 +38,8 @@ def main(arguments: Sequence[str], shown: str) -> None:
             scoring.print_table(given.frames or 300, *size)
         elif given.what == "data":
             reading.print_table(int(given.events), *size)
+        elif given.what == "files":
+            event_files.print_table(int(given.events))
         else:
             simulators.print_table(given.frames or 60, *size, given.only, given.clip)
     except (OSError, ValueError) as error:

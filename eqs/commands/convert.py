@@ -7,8 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from eqs.commands.reading import add_reading, opened
+from eqs.commands.reading import add_reading, opened, with_progress
 from eqs.events import EventWriter
+from eqs.events.ordered import OrderedFile
 
 
 def main(arguments: Sequence[str], shown: str) -> None:
@@ -21,14 +22,28 @@ def main(arguments: Sequence[str], shown: str) -> None:
     try:
         if given.out.exists():
             raise ValueError(f"Expected no file at {given.out}, got one; name another place")
-        pieces = opened(given.file, given)
-        count = 0
-        with EventWriter(given.out, pieces.height, pieces.width) as writer:
-            for events in pieces:
-                writer.append(events)
-                count += len(events)
-            writer.span_us = pieces.span_us
+        file = opened(given.file, given)
+        count = written(file, given.out)
     except (OSError, ValueError) as error:
         sys.exit(str(error))
-    sorted_in = f", {pieces.disorder} of them put in order" if pieces.disorder else ""
-    sys.stdout.write(f"{given.out}: {count:,} events of {pieces.kind}{sorted_in}\n")
+    sorted_in = f", {file.disorder} of them put in order" if file.disorder else ""
+    sys.stdout.write(f"{given.out}: {count:,} events of {file.kind}{sorted_in}\n")
+
+
+def written(file: OrderedFile, out: Path) -> int:
+    """Write a file's events, and say how many there are.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it cannot be read, or not be written.
+    """
+    pieces = with_progress(iter(file), f"writing {out}")
+    first = next(pieces)
+    count = len(first)
+    with EventWriter(out, height=first.height, width=first.width) as writer:
+        writer.append(first)
+        for piece in pieces:
+            writer.append(piece)
+            count += len(piece)
+        writer.span_us = file.span_us
+    return count

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 
-from eqs.events.pieces import EventPieces, ReadAs
-from eqs.events.tables import UNITS_US
+from rich.console import Console
+from rich.progress import track
+
+from eqs.events import Events
+from eqs.events.hints import UNITS_US, Hints
+from eqs.events.ordered import HELD, OrderedFile
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
@@ -16,16 +21,37 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--order", help="order of a table's columns, for instance txyp")
     parser.add_argument("--time-unit", choices=[*UNITS_US], help="unit of a table's times")
     parser.add_argument(
-        "--first-pixel", type=int, choices=(0, 1), help="first column and row of a MATLAB file"
+        "--first-pixel", type=int, choices=[0, 1], help="first row and column in a MATLAB file"
+    )
+    parser.add_argument(
+        "--whole",
+        action="store_true",
+        help=f"hold all of the file, to sort events that come more than {HELD} places late",
     )
 
 
-def opened(path: Path, given: argparse.Namespace) -> EventPieces:
+def hints(given: argparse.Namespace) -> Hints:
+    """What the command line says about the file.
+
+    Raises:
+        ValueError: it says what no file can be.
+    """
+    names = ("height", "width", "order", "time_unit", "first_pixel")
+    return Hints(**{name: getattr(given, name) for name in names})
+
+
+def opened(path: Path, given: argparse.Namespace) -> OrderedFile:
     """The file, to be read piece by piece.
 
     Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is of no known kind, damaged, or fits several readings.
+        ValueError: the command line says what no file can be.
     """
-    names = ("height", "width", "order", "time_unit", "first_pixel")
-    return EventPieces(path, ReadAs(**{name: getattr(given, name) for name in names}))
+    return OrderedFile(path, hints(given), None if given.whole else HELD)
+
+
+def with_progress(pieces: Iterator[Events], what: str) -> Iterator[Events]:
+    """The pieces, with a sign of life on a terminal while they pass."""
+    console = Console(stderr=True)
+    return iter(
+        track(pieces, what, console=console, transient=True, disable=not console.is_terminal)
+    )

@@ -1,6 +1,6 @@
 """Data sets on disk: recordings, labels, simulated streams."""
 
-from eqs.data.converted import Tables, converted
+from eqs.data.converted import converted
 from eqs.data.dataset import Dataset
 from eqs.data.dsec import DSECFolder, parse_size
 from eqs.data.event_view import EventView
@@ -31,7 +31,6 @@ __all__ = [
     "Recording",
     "RecordingFolder",
     "SimulatedEvents",
-    "Tables",
     "YoloLabels",
     "converted",
     "detection_windows",

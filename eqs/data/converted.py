@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from eqs.content import content_hash
 from eqs.events import Events, EventWriter
 from eqs.events.formats import decode, is_dsec
-from eqs.events.pieces import EventPieces, ReadAs
+from eqs.events.hints import NOTHING_SAID, Hints
+from eqs.events.ordered import OrderedFile
 from eqs.files import one_at_a_time, short_hash
 
 
-@dataclass(frozen=True, kw_only=True)
-class Tables:
-    """What tables of numbers do not say of themselves.
-
-    Args:
-        order: order of the columns, for instance `txyp`.
-        time_unit: unit of whole-numbered times: s, ms, us or ns.
-        first_pixel: number of the first column and row in a MATLAB file, 0 or 1.
-    """
-
-    order: str | None = None
-    time_unit: str | None = None
-    first_pixel: int | None = None
-
-
 def converted(
-    path: Path, folder: Path | str, height: int, width: int, tables: Tables | None = None
+    path: Path, folder: Path | str, height: int, width: int, hints: Hints = NOTHING_SAID
 ) -> Path:
     """The file itself where it is in the layout of DSEC, else a copy that is, made if need be.
 
@@ -37,7 +23,7 @@ def converted(
         folder: where copies are kept, by what the files hold.
         height: rows of the sensor.
         width: columns of the sensor.
-        tables: how to read tables of numbers.
+        hints: what the file does not say of itself.
 
     Raises:
         FileNotFoundError: there is no such file.
@@ -45,24 +31,23 @@ def converted(
     """
     if is_dsec(path):
         return path
-    read_as = short_hash([height, width, asdict(tables or Tables())])
+    read_as = short_hash([height, width, asdict(hints)])
     kept = Path(folder) / f"{path.stem}-{content_hash(path)}-{read_as}.h5"
     if not kept.exists():
         with one_at_a_time(kept, f"converting {path}"):
             if not kept.exists():  # another process was at it
-                _convert(path, kept, height, width, tables or Tables())
+                _convert(path, kept, replace(hints, height=height, width=width))
     return kept
 
 
-def _convert(path: Path, kept: Path, height: int, width: int, tables: Tables) -> None:
-    pieces = EventPieces(path, ReadAs(height=height, width=width, **asdict(tables)))
-    with EventWriter(kept, height, width) as writer:
-        for events in pieces:
+def _convert(path: Path, kept: Path, hints: Hints) -> None:
+    file = OrderedFile(path, hints)
+    with EventWriter(kept, hints.height or 0, hints.width or 0) as writer:
+        for events in file:
             writer.append(events)
-        writer.span_us = pieces.span_us
 
 
-def read(path: Path, height: int, width: int, tables: Tables | None = None) -> Events:
+def read(path: Path, height: int, width: int, hints: Hints = NOTHING_SAID) -> Events:
     """The events of a file of any kind.
 
     Raises:
@@ -71,6 +56,4 @@ def read(path: Path, height: int, width: int, tables: Tables | None = None) -> E
     """
     if is_dsec(path):
         return Events.load(path, height, width)
-    tables = tables or Tables()
-    found = decode(path, tables.order, tables.time_unit, tables.first_pixel)
-    return found.events(height, width)
+    return decode(path, replace(hints, height=height, width=width)).events(height, width)

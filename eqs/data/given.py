@@ -11,9 +11,10 @@ from pathlib import Path
 from rich.progress import track
 
 from eqs.content import content_hash, content_hashes
-from eqs.data.converted import Tables, read
+from eqs.data.converted import read
 from eqs.data.places import EVENTS
 from eqs.data.recording import Recording
+from eqs.events.hints import NOTHING_SAID, Hints
 from eqs.files import one_at_a_time, read_json, short_hash, write_json
 
 log = logging.getLogger(__name__)
@@ -29,7 +30,7 @@ class GivenEvents:
         name: name of the simulator.
         from_first_frame: whether times count from each recording's first frame, and not on its
             clock.
-        tables: how to read tables of numbers.
+        hints: what the files do not say of themselves.
 
     Raises:
         ValueError: the name is taken, or none.
@@ -38,7 +39,7 @@ class GivenEvents:
     folder: Path | str
     name: str
     from_first_frame: bool = False
-    tables: Tables | None = None
+    hints: Hints = NOTHING_SAID
 
     def __post_init__(self) -> None:
         """Check the name."""
@@ -102,7 +103,7 @@ class GivenStreams:
         files = [path for path in files if not any(part.startswith(".") for part in path.parts)]
         names = [path.as_posix() for path in files]
         content = content_hashes(folder / path for path in files)
-        read_as = [self.given.from_first_frame, self.given.tables and asdict(self.given.tables)]
+        read_as = [self.given.from_first_frame, asdict(self.given.hints)]
         return f"{self.given.name}-{short_hash(['given', names, content, read_as])}"
 
     def path(self, recording: Recording) -> Path:
@@ -139,7 +140,7 @@ class GivenStreams:
 
     def _convert(self, recording: Recording) -> None:
         source = self.given.file(recording)
-        events = read(source, recording.height, recording.width, self.given.tables)
+        events = read(source, recording.height, recording.width, self.given.hints)
         first, last = (int(time) for time in recording.frame_times_us[[0, -1]])
         if self.given.from_first_frame:
             events = events.shifted(first)

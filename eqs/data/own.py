@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
 
-from eqs.data.converted import Tables, converted
+from eqs.data.converted import converted
 from eqs.data.dataset import Dataset
 from eqs.data.dsec import parse_size
 from eqs.data.label_files import LabelFiles, LabelledFrames
 from eqs.data.recording import Recording, frame_size, frame_times, frames_in
+from eqs.events.hints import NOTHING_SAID, Hints
 from eqs.frames.order import natural_key
 
 NAME = "{name}"
@@ -44,7 +45,7 @@ class OwnDataset(Dataset):
         splits: shell-style patterns of the recordings' names in each split.
         events: file of the events, of any kind that is read.
         converted: folder for events that are not in the layout of DSEC.
-        tables: how to read events that are tables of numbers.
+        hints: what event files do not say of themselves.
         frames: folder of the frames, pixel for pixel those of the sensor; None without frames.
         frame_times: text file of the frames' times, microseconds, one a line; None without frames,
             where detectors are asked at the times of the labels.
@@ -63,7 +64,7 @@ class OwnDataset(Dataset):
     splits: Mapping[str, Sequence[str]]
     events: str
     converted: Path | str
-    tables: Tables | None = None
+    hints: Hints = NOTHING_SAID
     frames: str | None = None
     frame_times: str | None = None
     labels: LabelFiles | None = None
@@ -101,7 +102,7 @@ class OwnDataset(Dataset):
         """
         size = parse_size(self.size)
         for each in track(self._found(), description="reading events", transient=True):
-            converted(each.events, self.converted, *size, self.tables)
+            converted(each.events, self.converted, *size, self.hints)
 
     def sequences(self) -> dict[str, list[OwnSequence]]:
         """The recordings of each split, which may be none."""
@@ -154,7 +155,7 @@ class OwnDataset(Dataset):
             height=height,
             width=width,
             frame_times_us=times_us,
-            events_path=converted(sequence.events, self.converted, height, width, self.tables),
+            events_path=converted(sequence.events, self.converted, height, width, self.hints),
             frame_paths=paths,
             tracks=tracks,
             label_paths=label_paths,

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from eqs.data.converted import Tables, converted
+from eqs.data.converted import converted
 from eqs.data.dataset import Dataset
 from eqs.data.places import EVENTS, FRAMES, Places, find_recordings
 from eqs.data.recording import Recording, frames_in
+from eqs.events.hints import NOTHING_SAID, Hints
 
 log = logging.getLogger(__name__)
 
@@ -27,14 +28,14 @@ class RecordingFolder(Dataset):
         name: name of the data set, used for the folders of what is derived from it.
         root: folder whose subfolders are recordings.
         converted: folder for events that are not in the layout of DSEC.
-        tables: how to read events that are tables of numbers.
+        hints: what event files do not say of themselves.
         crop_rows: number of rows, counted from the top, that are used; all of them if None.
     """
 
     name: str
     root: Path | str
     converted: Path | str
-    tables: Tables | None = None
+    hints: Hints = NOTHING_SAID
     crop_rows: int | None = None
 
     @property
@@ -92,7 +93,7 @@ class RecordingFolder(Dataset):
         if not found.events_path.exists():
             return found
         size = found.height, found.width
-        events = converted(found.events_path, self.converted, *size, self.tables)
+        events = converted(found.events_path, self.converted, *size, self.hints)
         return replace(found, events_path=events)
 
 

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import h5py
 
-from eqs.events.aedat import read_aedat2, read_aedat3, read_aedat4
+from eqs.events.aedat import read_aedat2, read_aedat3
+from eqs.events.aedat4 import read_aedat4
 from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
-from eqs.events.decoded import Decoded
+from eqs.events.decoded import Decoded, joined
+from eqs.events.hdf5 import DAMAGE
+from eqs.events.hints import NOTHING_SAID, Hints
 from eqs.events.loaded import LoadedEvents
 from eqs.events.matlab import read_matlab
 from eqs.events.raw import read_prophesee
 from eqs.events.reader import EventReader
 from eqs.events.ros import read_bag
-from eqs.events.tables import read_foreign_hdf5, read_numpy, read_text
+from eqs.events.tables import read_foreign_hdf5, read_numpy
+from eqs.events.text import read_text
 
+PIECE_BYTES = 1 << 20  # of vectors of events, some six million
 READ = (
     "DSEC, v2e, event_utils, MVSEC, M3ED and Metavision HDF5, RAW (EVT2, EVT2.1, EVT3), DAT, "
-    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, MATLAB, npy, npz, text and CSV"
+    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, npy, npz, MATLAB, text and CSV"
 )
 
 
@@ -36,7 +42,8 @@ def open_events(
     """
     if is_dsec(Path(path)):
         return EventReader(path, height, width, rows)
-    return LoadedEvents(decode(path).events(height, width), rows)
+    hints = Hints(height=height, width=width)
+    return LoadedEvents(decode(path, hints).events(height, width), rows)
 
 
 def is_dsec(path: Path) -> bool:
@@ -50,23 +57,32 @@ def is_dsec(path: Path) -> bool:
     try:
         with h5py.File(path) as file:
             return "ms_to_idx" in file
-    except OSError:
+    except DAMAGE:
         return True  # whose reader says what is wrong
 
 
-def decode(
-    path: Path | str,
-    order: str | None = None,
-    time_unit: str | None = None,
-    first_pixel: int | None = None,
-) -> Decoded:
-    """The events of a file that is not in the layout of DSEC.
+def decode(path: Path | str, hints: Hints = NOTHING_SAID) -> Decoded:
+    """The events of a file that is not in the layout of DSEC, all at once.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file is of no known kind, or damaged, or fits several readings.
+    """
+    return joined(pieces(path, hints), f"{path}, which holds no event")
+
+
+def pieces(
+    path: Path | str, hints: Hints = NOTHING_SAID, size: int = PIECE_BYTES
+) -> Iterator[Decoded]:
+    """The events of a file that is not in the layout of DSEC, piece by piece in the file's order.
+
+    Together they are the same whatever the size. Tables of other kinds than text and the HDF5
+    files of other programs come in one piece.
 
     Args:
         path: the file.
-        order: order of the columns of a table without names, for instance `txyp`.
-        time_unit: unit of a table's times, where they are whole numbers: s, ms, us or ns.
-        first_pixel: number of the first column and row in a MATLAB file, 0 or 1.
+        hints: what the file leaves open.
+        size: about how many bytes of the file make a piece.
 
     Raises:
         FileNotFoundError: there is no such file.
@@ -75,25 +91,35 @@ def decode(
     path = Path(path)
     first = _first_bytes(path)
     if first[:8] == b"\x89HDF\r\n\x1a\n":
-        return read_foreign_hdf5(path, time_unit)
-    if first[:1] == b"%":
-        return read_prophesee(path)
+        yield read_foreign_hdf5(path, hints)
+    elif first.startswith((b"#ROSBAG", b"SQLite format 3", b"\x89MCAP")):
+        yield from read_bag(path)
+    elif first.startswith(b"#!AER-DAT2"):
+        yield from read_aedat2(path, size, hints)
+    elif first.startswith(b"#!AER-DAT4"):
+        yield from read_aedat4(path)
+    elif first[:6] == b"\x93NUMPY" or (first[:4] == b"PK\x03\x04" and path.suffix == ".npz"):
+        yield read_numpy(path, hints)
+    elif first.startswith(b"MATLAB "):
+        yield read_matlab(path, hints)
+    elif path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv"):
+        yield from read_text(path, size, hints)
+    elif read := _binary(first, path):
+        yield from read(path, size)
+    elif path.suffix.lower() == ".dat":
+        yield from read_text(path, size, hints)
+    else:
+        raise ValueError(f"Expected {READ} in {path}, got none of them; convert it")
+
+
+def _binary(first: bytes, path: Path) -> Callable[[Path, int], Iterator[Decoded]] | None:
+    """What reads a small binary format, if the file is of one."""
     for start, read in (
-        (b"#!AER-DAT2", read_aedat2), (b"#!AER-DAT3", read_aedat3), (b"#!AER-DAT4", read_aedat4),
-        (HEADER, read_event_stream), (b"#ROSBAG", read_bag), (b"SQLite format 3", read_bag),
-        (b"\x89MCAP", read_bag),
+        (b"%", read_prophesee), (b"#!AER-DAT3", read_aedat3), (HEADER, read_event_stream),
     ):  # fmt: skip
         if first.startswith(start):
-            return read(path)
-    if first[:6] == b"\x93NUMPY" or (first[:4] == b"PK\x03\x04" and path.suffix == ".npz"):
-        return read_numpy(path, order, time_unit)
-    if first.startswith(b"MATLAB"):
-        return read_matlab(path, order, time_unit, first_pixel)
-    if path.suffix == ".bin":
-        return read_forty_bits(path)
-    if path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv", ".dat"):
-        return read_text(path, order, time_unit)
-    raise ValueError(f"Expected {READ} in {path}, got none of them; convert it")
+            return read
+    return read_forty_bits if path.suffix == ".bin" else None
 
 
 def _first_bytes(path: Path) -> bytes:

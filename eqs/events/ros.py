@@ -6,16 +6,17 @@ serialisation rules of ROS 1 and of CDR.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.events.caer import compressed_caer
-from eqs.events.decoded import Decoded, unwrapped
-from eqs.events.raw import evt3
+from eqs.events.bounded import BoundedPath
+from eqs.events.decoded import Clock, Decoded
+from eqs.events.words import Arrays, evt3, libcaer_cmp, untold
 from eqs.extras import needed
 
 PACKET = ("event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray")
@@ -68,94 +69,168 @@ class Message:
         return self.number(4), self.number(4)
 
 
-def read_bag(path: Path) -> Decoded:
+class Bag:
+    """A bag, open in the block: its topics, and the bytes of their messages.
+
+    Args:
+        path: the file.
+
+    Raises:
+        ValueError: the bag is damaged, or rosbags, the optional dependency `ros`, is not installed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Find out of which version it is."""
+        self.path = path
+        with path.open("rb") as file:
+            self.ros1 = file.read(len(ROS1)) == ROS1
+
+    def __enter__(self) -> Self:
+        """Open the bag."""
+        with needed("ros", f"to read {self.path}"):
+            from rosbags.rosbag1 import Reader as Reader1
+            from rosbags.rosbag2 import Reader as Reader2
+        with self._whole():
+            self._reader = (Reader1 if self.ros1 else Reader2)(BoundedPath(self.path))
+            self._reader.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the bag."""
+        self._reader.close()
+
+    def topics(self, kinds: Collection[str]) -> list[Any]:
+        """The topics of these kinds of messages."""
+        return [each for each in self._reader.connections if each.msgtype in kinds]
+
+    def listed(self) -> str:
+        """All topics and their kinds."""
+        return ", ".join(f"{each.topic} ({each.msgtype})" for each in self._reader.connections)
+
+    def messages(self, topic: Any) -> Iterator[bytes]:  # noqa: ANN401 - the library's own type
+        """The bytes of a topic's messages."""
+        with self._whole():
+            found = self._reader.messages(connections=[topic])
+        while True:
+            with self._whole():
+                message = next(found, None)
+            if message is None:
+                return
+            yield bytes(message[2])
+
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:  # the library raises whatever damage leads it to
+            raise ValueError(f"Expected a whole bag at {self.path}, got: {error}") from error
+
+
+def read_bag(path: Path) -> Iterator[Decoded]:
     """Events of the only topic with events in a bag.
 
     Raises:
-        ValueError: there is none, or there are several, or their encoding is not read here; or
-            rosbags, the optional dependency `ros`, is not installed.
+        ValueError: there is none, or there are several, or their encoding is not read here, or the
+            bag is damaged; or rosbags, the optional dependency `ros`, is not installed.
     """
-    with needed("ros", f"to read {path}"):
-        from rosbags.rosbag1 import Reader as Reader1
-        from rosbags.rosbag1 import ReaderError as Error1
-        from rosbags.rosbag2 import Reader as Reader2
-        from rosbags.rosbag2 import ReaderError as Error2
-    with path.open("rb") as file:
-        ros1 = file.read(len(ROS1)) == ROS1
-    try:
-        with (Reader1 if ros1 else Reader2)(path) as reader:
-            found = [c for c in reader.connections if c.msgtype in (*PACKET, *ARRAY)]
-            if len(found) != 1:
-                held = ", ".join(f"{c.topic} ({c.msgtype})" for c in reader.connections)
-                raise ValueError(
-                    f"Expected one topic of events ({', '.join((*PACKET, *ARRAY))}) in {path}, "
-                    f"got {held or 'none'}; write the one that is meant into a bag of its own"
-                )
-            messages = (bytes(raw) for _, _, raw in reader.messages(connections=found))
-            read = packets if found[0].msgtype in PACKET else arrays
-            return read(messages, path, ros1=ros1)
-    except (Error1, Error2) as error:
-        raise ValueError(f"Expected a whole bag at {path}, got: {error}") from error
+    with Bag(path) as bag:
+        found = bag.topics((*PACKET, *ARRAY))
+        if len(found) != 1:
+            raise ValueError(
+                f"Expected one topic of events ({', '.join((*PACKET, *ARRAY))}) in {path}, "
+                f"got {bag.listed() or 'none'}; write the one that is meant into a bag of its own"
+            )
+        messages = bag.messages(found[0])
+        if found[0].msgtype in PACKET:
+            yield from packets(messages, path, ros1=bag.ros1)
+        else:
+            yield from arrays(messages, ros1=bag.ros1)
 
 
-def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Decoded:
-    """Events of packets: a camera's own encoding, or `mono`."""
-    parts: list[bytes] = []
-    bases: list[int] = []
-    height = width = 0
-    encoding = ""
+def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Iterator[Decoded]:
+    """Events of packets: a camera's own encoding, or `mono`.
+
+    Convention: a packet of `mono` or `libcaer_cmp` states the time that its events count from; the
+    others carry a clock of their own from packet to packet.
+
+    Raises:
+        ValueError: the packets are of another encoding.
+    """
+    decoders: dict[str, Callable[[bytes, int], Arrays]] = {
+        "evt3": _evt3(), "libcaer": _libcaer(), "libcaer_cmp": _libcaer_cmp(), "mono": _mono,
+    }  # fmt: skip
     for raw in messages:
         message = Message(raw, ros1=ros1)
         height, width = message.header()
         message.number(8)
         base_ns, encoding = message.number(8), message.text()
         message.number(1)
-        parts.append(message.bytes())
-        bases.append(base_ns)
-    content = b"".join(parts)
-    dropped = 0
-    if encoding == "evt3":
-        t, x, y, p, dropped = evt3(np.frombuffer(content[: len(content) // 2 * 2], "<u2"))
-    elif encoding == "mono":
-        words = np.frombuffer(content[: len(content) // 8 * 8], "<u8")
-        begun = np.repeat(np.array(bases, np.int64), [len(part) // 8 for part in parts])
-        t = (begun + (words & np.uint64(0xFFFFFFFF)).astype(np.int64)) // 1000
-        place = (words >> np.uint64(32)).astype(np.int64)
-        x, y, p = place & 0x7FFF, place >> 16 & 0x7FFF, place >> 31
-    elif encoding == "libcaer":
-        pairs = np.frombuffer(content[: len(content) // 8 * 8], "<u4").reshape(-1, 2)
-        pairs = pairs[pairs[:, 0] & 1 == 1].astype(np.int64)  # the others were marked as none
-        t = unwrapped(pairs[:, 1], 1 << 31)
-        x, y, p = pairs[:, 0] >> 17, pairs[:, 0] >> 2 & 0x7FFF, pairs[:, 0] >> 1 & 1
-    elif encoding == "libcaer_cmp":
-        t, x, y, p, dropped = compressed_caer(parts, bases)
-    else:
-        raise ValueError(
-            f"Expected packets of evt3, mono, libcaer or libcaer_cmp in {path}, got "
-            f"{encoding or 'none'}; "
-            "convert them with event_camera_tools"
-        )
-    return Decoded(
-        kind=f"a bag of event packets ({encoding})", t=t, x=x, y=y, p=p,
-        height=height, width=width, dropped=dropped,
-    )  # fmt: skip
+        if encoding not in decoders:
+            raise ValueError(
+                f"Expected packets of {', '.join(decoders)} in {path}, got {encoding or 'none'}; "
+                "convert them with event_camera_tools"
+            )
+        t, x, y, p, dropped = decoders[encoding](message.bytes(), base_ns)
+        yield Decoded(
+            kind=f"a bag of event packets ({encoding})", t=t, x=x, y=y, p=p,
+            height=height or None, width=width or None, dropped=dropped,
+        )  # fmt: skip
 
 
-def arrays(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Decoded:
+def _whole(content: bytes, kind: str) -> NDArray[Any]:
+    """The words of a packet, without one that was cut off."""
+    return np.frombuffer(content, kind, len(content) // np.dtype(kind).itemsize)
+
+
+def _evt3() -> Callable[[bytes, int], Arrays]:
+    state = untold()
+    return lambda content, _: evt3(_whole(content, "<u2"), state)
+
+
+def _libcaer_cmp() -> Callable[[bytes, int], Arrays]:
+    state = untold()
+
+    def decode(content: bytes, base_ns: int) -> Arrays:
+        t, x, y, p, dropped = libcaer_cmp(_whole(content, "<u2"), state)
+        return t + base_ns // 1000, x, y, p, dropped
+
+    return decode
+
+
+def _libcaer() -> Callable[[bytes, int], Arrays]:
+    clock = Clock(1 << 31)
+
+    def decode(content: bytes, _: int) -> Arrays:
+        pairs = _whole(content, "<u4")
+        pairs = pairs[: len(pairs) // 2 * 2].reshape(-1, 2)
+        pairs = pairs[pairs[:, 0] & 1 == 1]  # the others were marked as none
+        data = pairs[:, 0]
+        x, y = (data >> 17).astype(np.uint16), (data >> 2 & 0x7FFF).astype(np.uint16)
+        return clock.counted(pairs[:, 1]), x, y, (data >> 1 & 1).astype(np.uint8), 0
+
+    return decode
+
+
+def _mono(content: bytes, base_ns: int) -> Arrays:
+    pairs = _whole(content, "<u4")
+    pairs = pairs[: len(pairs) // 2 * 2].reshape(-1, 2)
+    place = pairs[:, 1]
+    x, y = (place & 0x7FFF).astype(np.uint16), (place >> 16 & 0x7FFF).astype(np.uint16)
+    t = (base_ns + pairs[:, 0].astype(np.int64)) // 1000
+    return t, x, y, (place >> 31).astype(np.uint8), 0
+
+
+def arrays(messages: Iterator[bytes], *, ros1: bool) -> Iterator[Decoded]:
     """Events of arrays, each with a time of its own."""
-    parts: list[NDArray[Any]] = []
-    height = width = 0
     for raw in messages:
         message = Message(raw, ros1=ros1)
         height, width = message.header()
-        count = message.number(4)
-        parts.append(_records(message, count, ros1=ros1))
-    fields = np.concatenate(parts) if parts else np.zeros((0, 5), np.int64)
-    t = fields[:, 2] * 1_000_000 + fields[:, 3] // 1000
-    return Decoded(
-        kind="a bag of event arrays", t=t, x=fields[:, 0], y=fields[:, 1], p=fields[:, 4],
-        height=height or None, width=width or None,
-    )  # fmt: skip
+        fields = _records(message, message.number(4), ros1=ros1)
+        t = fields[:, 2] * 1_000_000 + fields[:, 3] // 1000
+        yield Decoded(
+            kind="a bag of event arrays", t=t, x=fields[:, 0], y=fields[:, 1], p=fields[:, 4],
+            height=height or None, width=width or None,
+        )  # fmt: skip
 
 
 def _records(message: Message, count: int, *, ros1: bool) -> NDArray[np.int64]:

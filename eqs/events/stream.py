@@ -163,10 +163,11 @@ class Events:
             ValueError: the file is of no known kind, damaged, or fits several readings.
         """
         from eqs.events.formats import decode, is_dsec
+        from eqs.events.hints import Hints
         from eqs.events.reader import EventReader
 
         if not is_dsec(Path(path)):
-            return decode(path).events(height, width)
+            return decode(path, Hints(height=height, width=width)).events(height, width)
         with EventReader(path, height=height, width=width) as reader:
             return reader.read()
 

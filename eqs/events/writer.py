@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from eqs.clock import backwards
-from eqs.events.reader import STORED_TYPES
+from eqs.events.handles import STORED_TYPES
 from eqs.events.stream import Events
 from eqs.files import complete_file
 

@@ -23,7 +23,7 @@ PARTS = ("data", "protocol", "model", "recipe", "datamodule", "task", "trainer",
 INCIDENTAL = {
     "data": {
         "root", "generator", "workers", "scored", "first_frames", "event_view", "converted",
-        "tables",
+        "hints",
     },
     "datamodule": {"seed", "num_workers", "histogram_cache", "evaluation_length"},
     "trainer": {

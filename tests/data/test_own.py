@@ -11,9 +11,9 @@ from eqs.data import (
     LabelProtocol,
     OwnDataset,
     RecordingFolder,
-    Tables,
     YoloLabels,
 )
+from eqs.events.hints import Hints
 
 EXPECTED = [(1_000_000, 4.0, 6.0, 8.0, 12.0, 3), (1_050_000, 16.0, 0.0, 4.0, 24.0, 5)]
 
@@ -42,7 +42,7 @@ def own(place, **options):
         "frames": "{name}/frames",
         "frame_times": "{name}/timestamps.txt",
         "converted": place.parent / "converted",
-        "tables": Tables(time_unit="us"),
+        "hints": Hints(time_unit="us"),
     }
     return OwnDataset(**{**settings, **options})
 
@@ -120,7 +120,7 @@ def test_events_of_another_kind_are_converted_once(place, make_events):
     found = Events.load(recording.events_path)
     assert all((getattr(found, n) == getattr(expected, n)).all() for n in "txyp")
     with pytest.raises(ValueError, match="unit of the whole-numbered times"):
-        own(place, tables=None, converted=place.parent / "other").prepare()
+        own(place, hints=Hints(), converted=place.parent / "other").prepare()
 
 
 def test_without_frames_the_labels_say_when(place):
@@ -197,7 +197,7 @@ def test_a_protocol_of_other_classes_is_refused(place):
 def test_recordings_with_one_event_file_beside_their_frames(place, tmp_path, make_recording):
     make_recording(place / "dsec", tracks=None)
     data = RecordingFolder(
-        name="recordings", root=place, converted=tmp_path / "kept", tables=Tables(time_unit="us")
+        name="recordings", root=place, converted=tmp_path / "kept", hints=Hints(time_unit="us")
     )
     data.prepare()
     assert [each.name for each in data.recordings()] == ["a_1", "b_1", "dsec"]

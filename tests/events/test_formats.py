@@ -1,20 +1,16 @@
 """Event files of other programs, encoded here by the descriptions of their formats."""
 
-import contextlib
 import zipfile
 
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from event_files import ENCODERS, HEIGHT, SIZE, WIDTH, evt3, rows
 
 from eqs.events import Events
 from eqs.events.formats import decode, is_dsec, open_events
+from eqs.events.hints import Hints
 from eqs.events.loaded import LoadedEvents
-
-HEIGHT, WIDTH = 48, 64
-SIZE = {"height": HEIGHT, "width": WIDTH}
 
 
 @pytest.fixture
@@ -23,93 +19,6 @@ def events():
     t = 1_000_000 + np.sort(generator.integers(0, 90_000, 500))
     x, y, p = (generator.integers(0, high, 500) for high in (WIDTH, HEIGHT, 2))
     return Events.from_arrays(t, x, y, p, **SIZE)
-
-
-def rows(events):
-    return np.stack([events.t, events.x, events.y, events.p], axis=1).astype(np.int64)
-
-
-def evt2(events):
-    words, high = [], None
-    for t, x, y, p in rows(events).tolist():
-        if t >> 6 != high:
-            high = t >> 6
-            words.append(8 << 28 | high & 0x0FFFFFFF)
-        words.append(p << 28 | (t & 63) << 22 | x << 11 | y)
-    return (
-        f"% evt 2.0\n% geometry {WIDTH}x{HEIGHT}\n% end\n".encode()
-        + np.array(words, "<u4").tobytes()
-    )
-
-
-def evt21(events):
-    words, high = [], None
-    for t, x, y, p in rows(events).tolist():
-        if t >> 6 != high:
-            high = t >> 6
-            words.append(8 << 60 | (high & 0x0FFFFFFF) << 32)
-        base, lane = x // 32 * 32, x % 32
-        words.append(p << 60 | (t & 63) << 54 | base << 43 | y << 32 | 1 << lane)
-    header = f"% evt 2.1\n% width {WIDTH}\n% height {HEIGHT}\n% end\n".encode()
-    return header + np.array(words, "<u8").tobytes()
-
-
-def evt3(events, vectors=True):
-    words, high = [], None
-    for index, (t, x, y, p) in enumerate(rows(events).tolist()):
-        if t >> 12 != high:
-            high = t >> 12
-            words.append(8 << 12 | high & 0xFFF)
-        words += [6 << 12 | t & 0xFFF, y]
-        if vectors and index % 2:
-            base = max(0, x - 15)
-            words.append(3 << 12 | p << 11 | base)
-            # Empty lanes move the base on until the event's lane comes.
-            words += [4 << 12 | (1 << (x - base) if x - base < 12 else 0)]
-            if x - base >= 12:
-                words.append(5 << 12 | 1 << (x - base - 12))
-        else:
-            words.append(2 << 12 | p << 11 | x)
-    header = f"% format EVT3;height={HEIGHT};width={WIDTH}\n% evt 3.0\n% end\n".encode()
-    return header + np.array(words, "<u2").tobytes()
-
-
-def dat(events):
-    table = rows(events)
-    data = table[:, 1] | table[:, 2] << 14 | table[:, 3] << 28
-    pairs = np.stack([table[:, 0], data], axis=1).astype("<u4")
-    header = f"% Version 2\n% Width {WIDTH}\n% Height {HEIGHT}\n".encode()
-    return header + b"\x0c\x08" + pairs.tobytes()
-
-
-def aedat3(events):
-    table = rows(events)
-    data = 1 | table[:, 3] << 1 | table[:, 2] << 2 | table[:, 1] << 17
-    body = np.stack([data, table[:, 0]], axis=1).astype("<u4").tobytes()
-    head = np.array([1, 0], "<i2").tobytes()
-    head += np.array([8, 4, 0, len(table), len(table), len(table)], "<i4").tobytes()
-    special = np.array([0, 0], "<i2").tobytes() + np.array([8, 4, 0, 1, 1, 1], "<i4").tobytes()
-    return b"#!AER-DAT3.1\r\n#Format: RAW\r\n#!END-HEADER\r\n" + special + b"\0" * 8 + head + body
-
-
-def event_stream(events):
-    content = bytearray(
-        b"Event Stream\x02\x00\x00\x01" + np.array([WIDTH, HEIGHT], "<u2").tobytes()
-    )
-    now = int(events.t[0]) - int(events.t[0])
-    for t, x, y, p in rows(events).tolist():
-        wait = t - int(events.t[0]) - now
-        content += b"\xff" * (wait // 127)
-        content.append((wait % 127) << 1 | p)
-        content += np.array([x, HEIGHT - 1 - y], "<u2").tobytes()
-        now = t - int(events.t[0])
-    return bytes(content)
-
-
-ENCODERS = {
-    "a.raw": evt2, "b.raw": evt21, "c.raw": evt3, "d.dat": dat, "e.aedat": aedat3,
-    "f.es": event_stream,
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ENCODERS)
@@ -185,14 +94,18 @@ def test_whole_times_need_a_unit_and_two_readings_an_order(tmp_path, events):
     np.save(path, rows(events))
     with pytest.raises(ValueError, match=r"unit of the whole-numbered times in .*; set time_unit="):
         decode(path)
-    np.testing.assert_array_equal(rows(decode(path, time_unit="us").events(**SIZE)), rows(events))
+    np.testing.assert_array_equal(
+        rows(decode(path, Hints(time_unit="us")).events(**SIZE)), rows(events)
+    )
     nanoseconds = rows(events) * [1000, 1, 1, 1]
     np.save(path, nanoseconds)
-    np.testing.assert_array_equal(rows(decode(path, time_unit="ns").events(**SIZE)), rows(events))
+    np.testing.assert_array_equal(
+        rows(decode(path, Hints(time_unit="ns")).events(**SIZE)), rows(events)
+    )
     np.save(path, np.array([[0, 0, 0, 0], [1, 1, 1, 1]]))
     with pytest.raises(ValueError, match=r"fit one order in .*, got txyp and .*; set order"):
-        decode(path, time_unit="us")
-    assert decode(path, "xypt", "us").t.tolist() == [0, 1]
+        decode(path, Hints(time_unit="us"))
+    assert decode(path, Hints(order="xypt", time_unit="us")).t.tolist() == [0, 1]
 
 
 @pytest.mark.parametrize("kind", ["v2e", "mvsec", "event_utils", "m3ed", "npz", "fields"])
@@ -229,7 +142,7 @@ def test_tables_of_other_programs(tmp_path, events, kind):
 
 def test_disorder_is_sorted_stably_and_counted(tmp_path):
     np.save(tmp_path / "a.npy", np.array([[5, 1, 0, 1], [3, 2, 0, 1], [5, 3, 0, 0], [4, 4, 0, 1]]))
-    found = decode(tmp_path / "a.npy", "txyp", "us")
+    found = decode(tmp_path / "a.npy", Hints(order="txyp", time_unit="us"))
     assert found.disorder == 2
     assert found.events(**SIZE).x.tolist() == [2, 4, 1, 3]
 
@@ -262,21 +175,3 @@ def test_what_cannot_be_read_is_named(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=said):
         Events.load(tmp_path / name, **SIZE)
-
-
-@settings(max_examples=20, deadline=None)
-@given(data=st.data(), name=st.sampled_from(sorted(ENCODERS)))
-def test_damaged_files_give_a_sentence_or_events(tmp_path_factory, data, name):
-    made = np.random.default_rng(1)
-    stream = Events.from_arrays(
-        np.sort(made.integers(0, 9000, 60)), made.integers(0, WIDTH, 60),
-        made.integers(0, HEIGHT, 60), made.integers(0, 2, 60), **SIZE,
-    )  # fmt: skip
-    content = bytearray(ENCODERS[name](stream))
-    for at in data.draw(st.lists(st.integers(0, len(content) - 1), max_size=8)):
-        content[at] = data.draw(st.integers(0, 255))
-    content = content[: data.draw(st.integers(0, len(content)))]
-    path = tmp_path_factory.mktemp("damaged") / name
-    path.write_bytes(bytes(content))
-    with contextlib.suppress(ValueError):  # whose sentence says what is wrong
-        assert len(Events.load(path, **SIZE)) <= 32 * len(content)

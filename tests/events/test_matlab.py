@@ -1,71 +1,80 @@
-"""MATLAB files of every shape that people have hold the same events; doubts are asked about."""
+"""MATLAB files, written by SciPy (version 5) and by hand (version 7.3)."""
 
-import h5py
 import numpy as np
 import pytest
+from event_files import save73
 from scipy.io import savemat
 
 from eqs.events.formats import decode
+from eqs.events.hints import Hints
 
-T, X, Y, P = [10, 20, 20, 35], [0, 3, 7, 2], [5, 0, 1, 4], [1, 0, 1, 0]
+T, X, Y, P = [10, 12, 40], [0, 7, 3], [2, 0, 5], [1, 0, 1]
+SIZE = {"height": 6, "width": 8}
+COLUMNS = {"x": np.array(X), "y": np.array(Y), "ts": np.array(T), "p": np.array(P)}
+ONE_BASED = {**COLUMNS, "x": COLUMNS["x"] + 1, "y": COLUMNS["y"] + 1}
 
 
-def rows(found):
-    return [list(map(int, getattr(found, name))) for name in "txyp"]
+def read(path, **hints):
+    events = decode(path, Hints(**SIZE, **hints)).events(**SIZE)
+    return [getattr(events, name).tolist() for name in "txyp"]
 
 
-def column(values):
-    return np.array(values, float)[:, None]
+@pytest.mark.parametrize("save", [savemat, save73])
+@pytest.mark.parametrize(
+    ("variables", "hints"),
+    [
+        (COLUMNS, {"time_unit": "us"}),
+        ({"x": X, "y": Y, "t": np.array(T) / 1e6, "pol": 2 * np.array(P) - 1}, {}),
+        ({"events": COLUMNS, "size": np.array([6, 8])}, {"time_unit": "us"}),
+        ({"data": {"inner": COLUMNS}}, {"time_unit": "us"}),
+        ({"TD": {**ONE_BASED, "p": COLUMNS["p"] + 1}}, {}),
+        ({"TD": {**ONE_BASED, "p": 2 * COLUMNS["p"] - 1}}, {"first_pixel": 1}),
+        ({"events": np.array([X, Y, T, P]).T}, {"order": "xytp", "time_unit": "us"}),
+    ],
+)
+def test_variables_structs_and_matrices(tmp_path, save, variables, hints):
+    save(tmp_path / "a.mat", variables)
+    assert read(tmp_path / "a.mat", **hints) == [T, X, Y, P]
+
+
+def test_pixels_that_reach_the_size_count_from_one(tmp_path):
+    wide = {**ONE_BASED, "x": np.array([1, 8, 4])}
+    savemat(tmp_path / "a.mat", wide)
+    assert read(tmp_path / "a.mat", time_unit="us") == [T, [0, 7, 3], Y, P]
 
 
 @pytest.mark.parametrize(
-    "content",
+    ("variables", "hints", "said"),
     [
-        {"t": column(T), "x": column(X), "y": column(Y), "p": column(P)},
-        {"ts": T, "x": X, "y": Y, "pol": 2 * np.array(P) - 1},
-        {"TD": {"x": column(X), "y": column(Y), "p": column(P) + 1, "ts": column(T)}, "meta": 7},
-        {"events": np.array([T, X, Y, P]).T.astype(float)},
+        (COLUMNS, {}, "unit of the whole-numbered times in .*; set time_unit"),
+        (
+            {**COLUMNS, "x": [1, 7, 3], "y": [2, 1, 5]},
+            {"time_unit": "us"},
+            "count from 0 or from 1, got .*; set first_pixel=0 or 1",
+        ),
+        ({"a": np.array([T, X, Y, P]).T, "b": np.zeros((3, 4))}, {}, "or one matrix .*, got a, b"),
+        (
+            {"a": COLUMNS, "b": COLUMNS},
+            {},
+            "Expected one set of x, y, t and p, .*; save the events",
+        ),
+        ({"a": np.array([[1, 0, 0, 1], [2, 1, 1, 0]])}, {}, "fit one order in .*; set order"),
+        ({**COLUMNS, "t": np.array(T)}, {}, "Expected one of ts and t, got both"),
+        ({"x": X, "y": Y, "t": T}, {}, "got t, x, y; save the events alone"),
+        ({**COLUMNS, "p": np.array([0, 1, 7])}, {"time_unit": "us"}, "polarities of 0 and 1 or -1"),
+        ({**COLUMNS, "x": np.array([0, 0.5, 1])}, {"time_unit": "us"}, "whole pixels"),
+        ({**COLUMNS, "ts": np.array([1, 2])}, {"time_unit": "us"}, "rows of as many numbers"),
     ],
-    ids=["variables", "signed", "structure of 1 and 2", "table"],
 )
-def test_every_shape_is_the_same_stream(tmp_path, content):
-    savemat(tmp_path / "a.mat", content)
-    found = decode(tmp_path / "a.mat", order="txyp", time_unit="us")
-    assert rows(found) == [T, X, Y, P]
-    assert found.kind.startswith("a MATLAB file")
+def test_what_fits_two_readings_or_none_is_named(tmp_path, variables, hints, said):
+    savemat(tmp_path / "a.mat", variables)
+    with pytest.raises(ValueError, match=said):
+        read(tmp_path / "a.mat", **hints)
 
 
-@pytest.mark.parametrize("inside", ["", "events/"])
-def test_the_newer_version_is_hdf5(tmp_path, inside):
-    path = tmp_path / "a.mat"
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, values in {"t": T, "x": X, "y": Y, "p": P}.items():
-            file[inside + name] = np.array([values], float)
-    with path.open("r+b") as file:
-        file.write(b"MATLAB 7.3 MAT-file".ljust(128))
-    assert rows(decode(path, time_unit="us")) == [T, X, Y, P]
-
-
-def test_counting_from_one_is_said(tmp_path):
-    from_one = {"x": np.array(X) + 1, "y": np.array(Y) + 1, "p": P, "t": T}
-    savemat(tmp_path / "a.mat", from_one)
-    with pytest.raises(ValueError, match=r"first pixel is 0 or 1 in .*; set first_pixel"):
-        decode(tmp_path / "a.mat", time_unit="us")
-    assert rows(decode(tmp_path / "a.mat", time_unit="us", first_pixel=1)) == [T, X, Y, P]
-    found = decode(tmp_path / "a.mat", time_unit="us", first_pixel=0)
-    assert found.x.tolist() == [value + 1 for value in X]
-    with pytest.raises(ValueError, match="unit of the whole-numbered times"):
-        decode(tmp_path / "a.mat", first_pixel=1)
-
-
-def test_other_content_and_damage_are_said(tmp_path):
-    savemat(tmp_path / "a.mat", {"image": np.zeros((9, 9)), "name": "a"})
-    with pytest.raises(ValueError, match=r"x, y, p and t .*got image, name; save them so"):
-        decode(tmp_path / "a.mat")
-    savemat(tmp_path / "b.mat", {"t": T, "x": X, "y": Y, "p": P[:2]})
-    with pytest.raises(ValueError, match="of one length"):
-        decode(tmp_path / "b.mat", time_unit="us")
-    whole = (tmp_path / "b.mat").read_bytes()
-    (tmp_path / "b.mat").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(ValueError, match="whole MATLAB file at"):
-        decode(tmp_path / "b.mat", time_unit="us")
+def test_damaged_files_are_named(tmp_path):
+    (tmp_path / "a.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(200, b"\x07"))
+    (tmp_path / "b.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(900))
+    for name in "ab":
+        with pytest.raises(ValueError, match=r"Expected a whole (MATLAB|HDF5) file"):
+            decode(tmp_path / f"{name}.mat")

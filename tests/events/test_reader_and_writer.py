@@ -2,6 +2,7 @@
 
 import multiprocessing
 import pickle
+import zlib
 from itertools import pairwise
 
 import h5py
@@ -301,11 +302,16 @@ def test_recordings_of_more_than_71_minutes(tmp_path, make_events, caplog):
 
 
 def test_more_events_than_31_bits_count(tmp_path):
-    """Two billion events at zero, stored nowhere, and three behind them."""
-    path, many = tmp_path / "e.h5", 2**31 + 1000
+    """Two billion events at zero, and three behind them."""
+    path, many, chunk = tmp_path / "e.h5", 2**31 + 1000, 2**24
     with h5py.File(path, "w") as file:
         for name, dtype in {"t": "u4", "x": "u2", "y": "u2", "p": "u1"}.items():
-            column = file.create_dataset(f"events/{name}", (many,), dtype, chunks=(1000,))
+            column = file.create_dataset(
+                f"events/{name}", (many,), dtype, chunks=(chunk,), compression="gzip"
+            )
+            packed = zlib.compress(bytes(chunk * column.dtype.itemsize), 1)
+            for first in range(0, many, chunk):
+                column.id.write_direct_chunk((first,), packed)
             column[-3:] = [5_000, 5_500, 6_000] if name == "t" else 1
         file["ms_to_idx"] = np.array([0, *[many - 3] * 5, many - 1], np.uint64)
     with EventReader(path, height=2, width=2) as reader:

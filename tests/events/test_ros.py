@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from event_files import Serialised, packet
 
+from eqs.events.decoded import joined
 from eqs.events.formats import decode
 from eqs.events.ros import arrays, packets
 
@@ -12,43 +14,8 @@ EVENTS = [(1_700_000_000_123_456, 5, 7, 1), (1_700_000_000_123_457, 600, 479, 0)
           (1_700_000_001_000_000, 0, 0, 1)]  # fmt: skip
 
 
-class Writer:
-    """Puts fields behind each other, aligned as CDR wants it, or not."""
-
-    def __init__(self, ros1):
-        self.ros1, self.content = ros1, bytearray() if ros1 else bytearray(b"\0\1\0\0")
-
-    def number(self, value, size):
-        if not self.ros1:
-            self.content += bytes(-(len(self.content) - 4) % size)
-        self.content += int(value).to_bytes(size, "little")
-
-    def bytes(self, value, zero=False):
-        value += b"\0" if zero and not self.ros1 else b""
-        self.number(len(value), 4)
-        self.content += value
-
-    def header(self, frame):
-        for _ in range(3 if self.ros1 else 2):
-            self.number(1, 4)
-        self.bytes(frame, zero=True)
-        self.number(480, 4)
-        self.number(640, 4)
-
-
-def packet(encoding, events, ros1, base_ns=0, frame=b"camera"):
-    writer = Writer(ros1)
-    writer.header(frame)
-    writer.number(1, 8)
-    writer.number(base_ns, 8)
-    writer.bytes(encoding, zero=True)
-    writer.number(0, 1)
-    writer.bytes(events)
-    return bytes(writer.content)
-
-
 def rows(found):
-    events = found.events()
+    events = joined(found, "none").events()
     return list(zip(*(getattr(events, name).tolist() for name in "txyp"), strict=True))
 
 
@@ -57,14 +24,14 @@ def rows(found):
 def test_arrays_of_events(ros1, frame):
     messages = []
     for part in (EVENTS[:2], [], EVENTS[2:]):
-        writer = Writer(ros1)
+        writer = Serialised(ros1)
         writer.header(frame)
         writer.number(len(part), 4)
         for t, x, y, p in part:
             for value, size in ((x, 2), (y, 2), (t // 10**6, 4), (t % 10**6 * 1000, 4), (p, 1)):
                 writer.number(value, size)
         messages.append(bytes(writer.content))
-    assert rows(arrays(iter(messages), Path("a"), ros1=ros1)) == EVENTS
+    assert rows(arrays(iter(messages), ros1=ros1)) == EVENTS
 
 
 @pytest.mark.parametrize("ros1", [True, False])
@@ -96,29 +63,36 @@ def test_words_of_evt3_go_on_from_packet_to_packet():
     assert rows(packets(iter(messages), Path("a"), ros1=False)) == [(4098, 5, 7, 1)]
 
 
-@pytest.mark.parametrize("ros1", [True, False])
-def test_compressed_packets_begin_their_times_anew(ros1):
-    """Words: 0 and 1 times, 2 column, 3 event, 4 base, 5 eight rows above it, which move it on."""
-    first = [0 << 12 | 1, 1 << 12 | 5, 2 << 12 | 9, 3 << 12 | 1 << 11 | 4]
-    first += [4 << 12 | 1 << 11 | 16, 5 << 12 | 0b101, 5 << 12 | 0b10]
-    second = [3 << 12 | 7, 1 << 12 | 2, 3 << 12 | 8]
-    messages = [
-        packet(b"libcaer_cmp", np.array(words, "<u2").tobytes(), ros1) for words in (first, second)
-    ]
-    found = packets(iter(messages), Path("a"), ros1=ros1)
-    base = found.t.min()
-    assert {(t - base, x, y, p) for t, x, y, p in rows(found)} == {
-        (4101, 9, 4, 1), (4101, 9, 16, 1), (4101, 9, 18, 1), (4101, 9, 25, 1),
-        (0, 9, 7, 0), (2, 9, 8, 0),
-    }  # fmt: skip
-
-
 def test_encodings_that_are_not_read_are_named():
-    message = packet(b"evt4", b"1234", False)
-    with pytest.raises(ValueError, match=r"libcaer or libcaer_cmp in a, got evt4; convert"):
-        packets(iter([message]), Path("a"), ros1=False)
+    message = packet(b"trigger", b"1234", False)
+    with pytest.raises(ValueError, match=r"libcaer_cmp, mono in a, got trigger; convert"):
+        list(packets(iter([message]), Path("a"), ros1=False))
     with pytest.raises(ValueError, match="got one that was cut off"):
-        packets(iter([message[:20]]), Path("a"), ros1=False)
+        list(packets(iter([message[:20]]), Path("a"), ros1=False))
+
+
+@pytest.mark.parametrize("ros1", [True, False])
+def test_compressed_libcaer_counts_from_the_packet_s_base(ros1):
+    high, low, column, row, first_row, eight = (kind << 12 for kind in range(6))
+    words = [
+        [column | 9, low | 5, row | 1 << 11 | 7, high | 1, low | 2, row | 8],
+        # The column is that of the packet before; a mask moves its first row on.
+        [first_row | 1 << 11 | 20, eight | 0b10000001, eight | 1, row | 3],
+    ]
+    messages = [
+        packet(b"libcaer_cmp", np.array(part, "<u2").tobytes(), ros1, base_ns=base)
+        for part, base in zip(words, (1_000_999, 9_000_000), strict=True)
+    ]
+    assert rows(packets(iter(messages), Path("a"), ros1=ros1)) == [
+        (1005, 9, 7, 1), (1000 + 4098, 9, 8, 0),
+        (9000, 9, 20, 1), (9000, 9, 27, 1), (9000, 9, 28, 1), (9000, 9, 3, 0),
+    ]  # fmt: skip
+
+
+def test_events_before_the_first_column_are_dropped():
+    words = np.array([3 << 12 | 7, 2 << 12 | 1, 3 << 12 | 7], "<u2").tobytes()
+    found = joined(packets(iter([packet(b"libcaer_cmp", words, False)]), Path("a"), ros1=False), "")
+    assert (found.dropped, len(found.t)) == (1, 1)
 
 
 @pytest.mark.parametrize("start", [b"#ROSBAG V2.0\n", b"SQLite format 3\0", b"\x89MCAP0\r\n"])
