@@ -1,4 +1,4 @@
-"""Files that are whole or not there, one writer at a time, hashes, lists of whole numbers."""
+"""Files that are whole or not there, folders too, one writer at a time, hashes, whole numbers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import hashlib
 import json
 import logging
 import os
+import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -53,6 +54,38 @@ def complete_file(path: Path | str) -> Iterator[Path]:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def complete_folder(path: Path | str) -> Iterator[Path]:
+    """Give a folder its name only when all that the block writes into it is there.
+
+    After an exception nothing is left.
+
+    Args:
+        path: the folder's name, which nothing may have yet.
+
+    Raises:
+        ValueError: there is something of that name.
+
+    Example:
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     with complete_folder(Path(folder) / "notes") as partial:
+        ...         _ = (partial / "a.txt").write_text("all of it")
+        ...     [file.name for file in Path(folder).rglob("*.txt")]
+        ['a.txt']
+    """
+    path = Path(path)
+    if path.exists():
+        raise ValueError(f"Expected nothing at {path}, got something; name another place")
+    partial = path.with_name(f"{path.name}.{uuid4().hex}{PARTIAL}")
+    partial.mkdir(parents=True)
+    try:
+        yield partial
+        partial.rename(path)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 def _remove_abandoned(path: Path) -> None:

@@ -1,49 +1,69 @@
-"""Convert an event file of any kind to HDF5 in the layout of DSEC."""
+"""Convert an event file of any kind, with its frames or without, to the layout of DSEC."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from eqs.commands.reading import add_reading, opened, with_progress
-from eqs.events import EventWriter
+from eqs.data.conversion import Written, write_events, write_recording
+from eqs.data.foreign_frames import EVENTS_TEXT, foreign_frames
 from eqs.events.ordered import OrderedFile
+
+SUFFIXES = (".h5", ".hdf5")
 
 
 def main(arguments: Sequence[str], shown: str) -> None:
-    """Read the command line and write the file."""
+    """Read the command line and write the file or the recording."""
     parser = argparse.ArgumentParser(prog=shown, description=__doc__)
-    parser.add_argument("file", type=Path, help="an event file of any kind that is read here")
-    parser.add_argument("out", type=Path, help="where the HDF5 file goes; nothing may be there")
+    parser.add_argument(
+        "file",
+        type=Path,
+        help=f"an event file of any kind that is read here, or a folder with {EVENTS_TEXT}",
+    )
+    parser.add_argument(
+        "out",
+        type=Path,
+        help="where the events go, ending in .h5; any other name becomes the folder of a recording "
+        "with the frames of the file; nothing may be there",
+    )
     add_reading(parser)
     given = parser.parse_args(arguments)
+    source, out = given.file, given.out
     try:
-        if given.out.exists():
-            raise ValueError(f"Expected no file at {given.out}, got one; name another place")
-        file = opened(given.file, given)
-        count = written(file, given.out)
+        if out.exists():
+            raise ValueError(f"Expected no file at {out}, got one; name another place")
+        file = opened(source / EVENTS_TEXT if source.is_dir() else source, given)
+        if out.suffix.lower() in SUFFIXES:
+            rest = left_out(file, source)
+            written = write_events(with_progress(file, f"writing {out}"), out, file)
+        else:
+            passing = partial(with_progress, what=f"writing {out}")
+            written = write_recording(file, source, out, passing)
+            rest = with_frames(written)
     except (OSError, ValueError) as error:
         sys.exit(str(error))
     sorted_in = f", {file.disorder} of them put in order" if file.disorder else ""
-    sys.stdout.write(f"{given.out}: {count:,} events of {file.kind}{sorted_in}\n")
+    sys.stdout.write(f"{out}: {written.events:,} events of {file.kind}{sorted_in}{rest}\n")
 
 
-def written(file: OrderedFile, out: Path) -> int:
-    """Write a file's events, and say how many there are.
+def left_out(file: OrderedFile, source: Path) -> str:
+    """What is said where a file of events alone was wanted; frames still tell the sensor's size."""
+    try:
+        frame = next(foreign_frames(source), None)
+    except ValueError:  # such that are not read here
+        return "; its frames were left out"
+    if frame is None:
+        return ""
+    file.fallback = frame.picture.shape[0], frame.picture.shape[1]
+    return "; its frames were left out, a name without .h5 takes them along"
 
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it cannot be read, or not be written.
-    """
-    pieces = with_progress(iter(file), f"writing {out}")
-    first = next(pieces)
-    count = len(first)
-    with EventWriter(out, height=first.height, width=first.width) as writer:
-        writer.append(first)
-        for piece in pieces:
-            writer.append(piece)
-            count += len(piece)
-        writer.span_us = file.span_us
-    return count
+
+def with_frames(written: Written) -> str:
+    """What is said of a recording's frames."""
+    if not written.frames:
+        return "; it has no frames of the sensor's own pixels"
+    return f", {written.frames} frames"

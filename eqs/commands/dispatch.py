@@ -14,7 +14,7 @@ from eqs.extras import needed
 # Verbs with a command line of their own: module below eqs.commands, and what they do.
 PLAIN = {
     "info": "Say what an event file of any kind holds.",
-    "convert": "Convert an event file of any kind to HDF5 in the layout of DSEC.",
+    "convert": "Convert an event file of any kind, with its frames, to the layout of DSEC.",
     "view": "Show an event file as a GIF, an MP4 or a strip of stills.",
     "watch": "Film what a trained detector finds.",
     "benchmark": "Time simulators, score, detector, or reading for a training, on this machine.",

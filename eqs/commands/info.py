@@ -108,7 +108,7 @@ def main(arguments: Sequence[str], shown: str) -> None:
     given = parser.parse_args(arguments)
     try:
         file = opened(given.file, given)
-        tally = Tally.of(with_progress(iter(file), f"reading {given.file}"))
+        tally = Tally.of(with_progress(file, f"reading {given.file}"))
     except (OSError, ValueError) as error:
         sys.exit(str(error))
     lines = [*described(file, tally), "", sketch(tally.picture), ""]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from rich.console import Console
@@ -49,7 +49,7 @@ def opened(path: Path, given: argparse.Namespace) -> OrderedFile:
     return OrderedFile(path, hints(given), None if given.whole else HELD)
 
 
-def with_progress(pieces: Iterator[Events], what: str) -> Iterator[Events]:
+def with_progress(pieces: Iterable[Events], what: str) -> Iterator[Events]:
     """The pieces, with a sign of life on a terminal while they pass."""
     console = Console(stderr=True)
     return iter(

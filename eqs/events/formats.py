@@ -11,13 +11,13 @@ from eqs.events.aedat import read_aedat2, read_aedat3
 from eqs.events.aedat4 import read_aedat4
 from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
 from eqs.events.decoded import Decoded, joined
-from eqs.events.hdf5 import DAMAGE
+from eqs.events.hdf5 import DAMAGE, HDF5
 from eqs.events.hints import NOTHING_SAID, Hints
 from eqs.events.loaded import LoadedEvents
 from eqs.events.matlab import read_matlab
 from eqs.events.raw import read_prophesee
 from eqs.events.reader import EventReader
-from eqs.events.ros import read_bag
+from eqs.events.ros import BAGS, read_bag
 from eqs.events.tables import read_foreign_hdf5, read_numpy
 from eqs.events.text import read_text
 
@@ -52,7 +52,7 @@ def is_dsec(path: Path) -> bool:
     Raises:
         FileNotFoundError: there is no such file.
     """
-    if _first_bytes(path)[:8] != b"\x89HDF\r\n\x1a\n":
+    if first_bytes(path)[:8] != HDF5:
         return path.suffix.lower() in (".h5", ".hdf5")  # whose reader says what is wrong
     try:
         with h5py.File(path) as file:
@@ -89,10 +89,10 @@ def pieces(
         ValueError: the file is of no known kind, or damaged, or fits several readings.
     """
     path = Path(path)
-    first = _first_bytes(path)
-    if first[:8] == b"\x89HDF\r\n\x1a\n":
+    first = first_bytes(path)
+    if first[:8] == HDF5:
         yield read_foreign_hdf5(path, hints)
-    elif first.startswith((b"#ROSBAG", b"SQLite format 3", b"\x89MCAP")):
+    elif first.startswith(BAGS):
         yield from read_bag(path)
     elif first.startswith(b"#!AER-DAT2"):
         yield from read_aedat2(path, size, hints)
@@ -122,7 +122,12 @@ def _binary(first: bytes, path: Path) -> Callable[[Path, int], Iterator[Decoded]
     return read_forty_bits if path.suffix == ".bin" else None
 
 
-def _first_bytes(path: Path) -> bytes:
+def first_bytes(path: Path) -> bytes:
+    """What tells most formats from each other.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
     if not path.is_file():
         raise FileNotFoundError(
             f"Expected an event file at {path}, found none; check data.root, or make the file first"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import h5py
 
+HDF5 = b"\x89HDF\r\n\x1a\n"  # what a file begins with
 # What the library raises where a file does not hold what it says.
 DAMAGE = (OSError, RuntimeError, LookupError, TypeError, AttributeError, MemoryError, UnicodeError)
 

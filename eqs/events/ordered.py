@@ -53,6 +53,8 @@ class OrderedFile:
     ) -> None:
         """Remember the file; nothing is opened yet."""
         self.path, self.hints, self.held, self.size = Path(path), hints, held, size
+        self.fallback: tuple[int, int] | None = None
+        """Height and width of the sensor where neither the file nor a hint says them."""
         self.kind = ""
         self.disorder = self.dropped = 0
         self.span_us: tuple[int, int] | None = None
@@ -74,7 +76,16 @@ class OrderedFile:
         for part in in_order(self._counted(), self.held, self.path):
             for start in range(0, max(len(part.t), 1), PIECE_EVENTS):
                 piece = part[start : start + PIECE_EVENTS]
-                yield piece.events(self.hints.height, self.hints.width)
+                yield piece.events(*self._size(piece))
+
+    def _size(self, piece: Decoded) -> tuple[int | None, int | None]:
+        """Height and width as far as they are told."""
+        height, width = self.hints.height, self.hints.width
+        if self.fallback is not None and (piece.height or height) is None:
+            height = self.fallback[0]
+        if self.fallback is not None and (piece.width or width) is None:
+            width = self.fallback[1]
+        return height, width
 
     def _counted(self) -> Iterator[Decoded]:
         """The file's pieces, while their faults are counted."""

@@ -21,7 +21,9 @@ from eqs.extras import needed
 
 PACKET = ("event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray")
 ARRAY = ("dvs_msgs/msg/EventArray", "prophesee_event_msgs/msg/EventArray")
+IMAGE = ("sensor_msgs/msg/Image",)
 ROS1 = b"#ROSBAG"
+BAGS = (ROS1, b"SQLite format 3", b"\x89MCAP")  # what they begin with
 
 
 class Message:
@@ -36,6 +38,7 @@ class Message:
         """Begin at the first field."""
         self.raw, self.ros1 = raw, ros1
         self.start = self.at = 0 if ros1 else 4
+        self.stamp_us = 0
 
     def number(self, size: int) -> int:
         """The next whole number of so many bytes.
@@ -62,10 +65,11 @@ class Message:
         return bytes(self.raw[self.at - count : self.at])
 
     def header(self) -> tuple[int, int]:
-        """Skip the stamp, and give height and width, which follow it."""
+        """Height and width, which follow the stamp and the frame's name; the stamp is kept."""
         if self.ros1:
             self.number(4)
-        self.number(4), self.number(4), self.text()
+        self.stamp_us = 1_000_000 * self.number(4) + self.number(4) // 1000
+        self.text()
         return self.number(4), self.number(4)
 
 

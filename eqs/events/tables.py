@@ -227,7 +227,7 @@ def decoded(
         time_unit = "s"
     x, y = (columns[name].astype(np.int64) for name in "xy")
     return Decoded(
-        kind=f"{kind}, times in {time_unit}", t=_microseconds(t, time_unit, path), x=x, y=y,
+        kind=f"{kind}, times in {time_unit}", t=microseconds(t, time_unit, path), x=x, y=y,
         p=(columns["p"] > 0).astype(np.uint8), height=height, width=width,
     )  # fmt: skip
 
@@ -270,8 +270,12 @@ def _check(columns: Mapping[str, NDArray[Any]], path: Path) -> None:
         )
 
 
-def _microseconds(t: NDArray[Any], time_unit: str, path: Path) -> NDArray[np.int64]:
-    """Times of a unit, the fractions cut off."""
+def microseconds(t: NDArray[Any], time_unit: str, path: Path) -> NDArray[np.int64]:
+    """Times of a unit in whole microseconds, the fractions cut off.
+
+    Raises:
+        ValueError: a time is too large.
+    """
     factor = UNITS_US[time_unit]
     most = max(abs(float(t.min(initial=0))), abs(float(t.max(initial=0))))
     if most * factor >= LATEST_US:

@@ -1,9 +1,11 @@
 """Event files of other programs, written by the descriptions of their formats."""
 
+import io
 import zipfile
 
 import h5py
 import numpy as np
+from PIL import Image
 from rosbags import rosbag1, rosbag2
 from scipy.io import savemat
 
@@ -255,6 +257,20 @@ def event_array(events, ros1):
     return bytes(message.content)
 
 
+def image(picture, encoding, time_us, ros1, padding=0):
+    """A message of `sensor_msgs/Image`, whose rows may be longer than their pixels."""
+    height, width = picture.shape[:2]
+    message = Serialised(ros1)
+    message.header(b"camera", time_us, height, width)
+    message.bytes(encoding.encode(), zero=True)
+    message.number(0, 1)
+    rows_of = np.ascontiguousarray(picture).reshape(height, -1)
+    padded = np.pad(rows_of, ((0, 0), (0, padding)), constant_values=7)
+    message.number(padded.shape[1], 4)
+    message.bytes(padded.tobytes())
+    return bytes(message.content)
+
+
 STAMP = "std_msgs/Header header\n"
 DEFINITIONS = {
     "dvs_msgs/msg/EventArray": f"{STAMP}uint32 height\nuint32 width\nuint8[] events\n",
@@ -324,6 +340,40 @@ def in_halves(events, ros1):
     ]
 
 
+def shades(count=2):
+    """Small pictures of one level each."""
+    return [np.full((HEIGHT, WIDTH), 90 * k, np.uint8) for k in range(1, count + 1)]
+
+
+def aedat4_with_frames(events):
+    return aedat4(events, [(t, t, t + 9, each) for t, each in enumerate(shades())])
+
+
+def bag_with_frames(path, events):
+    pictures = [
+        ("/image", "sensor_msgs/msg/Image", 2000 + t, image(each, "mono8", t, True))
+        for t, each in enumerate(shades())
+    ]
+    write_bag(path, [*in_halves(events, True), *pictures])
+
+
+def mvsec_with_frames(path, events):
+    write_hdf5(path, events, {
+        "davis/left/events": mvsec(events), "davis/left/image_raw": np.stack(shades()),
+        "davis/left/image_raw_ts": np.array([1.0, 1.1]),
+    })  # fmt: skip
+
+
+def zip_with_frames(path, events):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a/events.txt", text(events))
+        archive.writestr("a/images.txt", "0.1 images/0.png\n0.2 images/1.png\n")
+        for index, each in enumerate(shades()):
+            picture = io.BytesIO()
+            Image.fromarray(each).save(picture, "PNG")
+            archive.writestr(f"a/images/{index}.png", picture.getvalue())
+
+
 def in_packets(events):
     words = evt3(events)
     words = words[words.index(b"% end\n") + 6 :]
@@ -366,7 +416,8 @@ WRITERS = {
     "w.h5": lambda path, events: write_hdf5(
         path, events, {f"events/{n}s": v for n, v in columns(events).items()}
     ),
-    "x.hdf5": lambda path, events: write_hdf5(path, events, {"davis/left/events": mvsec(events)}),
+    "x.hdf5": mvsec_with_frames, "y.bag": bag_with_frames, "z.zip": zip_with_frames,
+    "frames.aedat4": lambda path, events: path.write_bytes(aedat4_with_frames(events)),
 }  # fmt: skip
 TOLD = {
     "h.aedat": {"height": 180, "width": 240}, "k.csv": {"time_unit": "us"},

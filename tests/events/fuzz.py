@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from event_files import SIZE, TOLD, WRITERS
 
+from eqs.data.foreign_frames import foreign_frames
 from eqs.events import Events
 from eqs.events.formats import decode, is_dsec
 from eqs.events.hints import Hints
@@ -68,6 +69,9 @@ def damaged(content, seed):
 
 
 def read(path, told, whole):
+    """The events of a file, once its frames, if it has any, have been read too."""
+    if whole:
+        sum(frame.picture.size for frame in foreign_frames(path))
     hints = Hints(**told)
     if is_dsec(path):
         return [Events.load(path, hints.height, hints.width)]
@@ -110,7 +114,7 @@ def outcome(path, told, whole):
         ended = f"FAULT {peak / 1e6:.0f} MB held for {path.stat().st_size} bytes, {ended}"
     if (took := time.perf_counter() - start) > SECONDS / 2:
         ended = f"FAULT {took:.0f} s, {ended}"
-    return ended.replace("\n", " ")[:300]
+    return " ".join(ended.encode("ascii", "backslashreplace").decode().split())[:300]
 
 
 def late(*_):
