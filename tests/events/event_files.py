@@ -110,11 +110,10 @@ def aedat2(events):
 
 def aedat2_of_v2e(events, height=180, width=240):
     table = rows(events)
-    address = (width - 1 - table[:, 1]) << 12 | (height - 1 - table[:, 2]) << 22 | table[:, 3] << 11
+    x, y, p = width - 1 - table[:, 1], height - 1 - table[:, 2], table[:, 3]
+    address = x << 1 | y << 11 | p if width == 640 else x << 12 | y << 22 | p << 11
     pairs = np.stack([address, table[:, 0]], axis=1)
-    header = (
-        b"#!AER-DAT2.0\r\n# This is a raw AE data file created by AEDat2Output in v2e (see x)\r\n"
-    )
+    header = b"#!AER-DAT2.0\r\n# This is a file created by AEDat2Output in v2e (see x)\r\n"
     return header + pairs.astype(">u4").tobytes()
 
 
@@ -183,7 +182,7 @@ STREAM = """<node name="{0}" path="/mainloop/Recorder/outInfo/{0}/">
 </node></node>"""
 
 
-def aedat4(events, frames=()):
+def aedat4(events, frames=(), compression=0, compress=bytes):
     """Events, then frames of (time, start and stop of the exposure, picture of 8 bits)."""
     streams = [STREAM.format(0, "events", "EVTS", WIDTH, HEIGHT)]
     packed = np.zeros(
@@ -203,9 +202,13 @@ def aedat4(events, frames=()):
         numbers += [("i1", kind), ("<i2", width), ("<i2", height), ("<i2", 0), ("<i2", 0)]
         packets.append((1, flat(b"FRME", [*numbers, ("<u4", vector(pixels, len(pixels)))])))
     xml = INFO.format("".join(streams)).encode()
-    header = flat(b"IOHE", [("<i4", 0), ("<i8", -1), ("<u4", vector(xml + b"\0", len(xml)))])
+    header = flat(
+        b"IOHE", [("<i4", compression), ("<i8", -1), ("<u4", vector(xml + b"\0", len(xml)))]
+    )
+    packed_packets = [(stream, compress(content)) for stream, content in packets]
     body = b"".join(
-        np.array([stream, len(content)], "<i4").tobytes() + content for stream, content in packets
+        np.array([stream, len(content)], "<i4").tobytes() + content
+        for stream, content in packed_packets
     )
     return b"#!AER-DAT4.0\r\n" + header + body
 

@@ -3,9 +3,21 @@
 import zipfile
 
 import h5py
+import lz4.frame
 import numpy as np
 import pytest
-from event_files import ENCODERS, HEIGHT, SIZE, WIDTH, evt3, rows
+from backports import zstd
+from event_files import (
+    ENCODERS,
+    HEIGHT,
+    SIZE,
+    WIDTH,
+    aedat2_of_v2e,
+    aedat4,
+    evt3,
+    rows,
+    text,
+)
 
 from eqs.events import Events
 from eqs.events.formats import decode, is_dsec, open_events
@@ -55,6 +67,64 @@ def test_addresses_of_jaer_are_turned_upright(tmp_path, chip):
     found = Events.load(tmp_path / "a.aedat")
     assert (found.height, found.width) == (height, width)
     np.testing.assert_array_equal(rows(found), np.stack([t, x, y, p], axis=1))
+
+
+@pytest.mark.parametrize(("height", "width"), [(180, 240), (260, 346), (480, 640)])
+def test_files_of_v2e_are_turned_upright_and_need_their_sensor(tmp_path, events, height, width):
+    path, size = tmp_path / "a.aedat", {"height": height, "width": width}
+    content = aedat2_of_v2e(events, **size)
+    noise = b"# noise events are labeled as addressed external input events\r\n"
+    for label in (b"", noise):
+        path.write_bytes(content.replace(b"(see x)\r\n", b"(see x)\r\n" + label))
+        with pytest.raises(ValueError, match=r"sensor that v2e wrote .* got none; set height"):
+            decode(path)
+        if label and width == 640:
+            with pytest.raises(ValueError, match="labels of noise wrote over"):
+                decode(path, Hints(**size))
+        else:
+            np.testing.assert_array_equal(rows(Events.load(path, **size)), rows(events))
+    with pytest.raises(ValueError, match="got 320x240; set height and width"):
+        decode(path, Hints(height=240, width=320))
+
+
+@pytest.mark.parametrize(
+    ("kind", "compress"), [(0, bytes), (1, lz4.frame.compress), (3, zstd.compress)]
+)
+def test_packets_of_aedat4_however_compressed(tmp_path, events, kind, compress):
+    (tmp_path / "a.aedat4").write_bytes(aedat4(events, compression=kind, compress=compress))
+    found = Events.load(tmp_path / "a.aedat4")
+    np.testing.assert_array_equal(rows(found), rows(events))
+    assert (found.height, found.width) == (HEIGHT, WIDTH)
+
+
+def test_an_aedat4_file_without_events_says_what_it_has(tmp_path, events):
+    content = aedat4(events).replace(b"EVTS</attr>", b"TRIG</attr>")
+    (tmp_path / "a.aedat4").write_bytes(content)
+    with pytest.raises(ValueError, match=r"Expected a stream of EVTS in .*, got TRIG"):
+        Events.load(tmp_path / "a.aedat4")
+
+
+def test_whole_nanoseconds_in_text_stay_exact(tmp_path):
+    # As floats these differ from their neighbours by more than a microsecond's fraction.
+    times = [1_676_562_141_437_616_999, 1_676_562_141_437_617_000]
+    (tmp_path / "a.csv").write_text(
+        "% made for a test\nt,x,y,p\n" + "".join(f"{t},1,2,1\n" for t in times)
+    )
+    found = decode(tmp_path / "a.csv", Hints(time_unit="ns"))
+    assert found.t.tolist() == [1_676_562_141_437_616, 1_676_562_141_437_617]
+
+
+def test_the_events_in_a_zip_are_found_by_name(tmp_path, events):
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("scene/calib.txt", "1 2 3 4")
+        archive.writestr("scene/events.txt", text(events))
+    np.testing.assert_array_equal(rows(Events.load(path, **SIZE)), rows(events))
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a.txt", "1 2 3 4")
+        archive.writestr("b.txt", "1 2 3 4")
+    with pytest.raises(ValueError, match=r"events.txt or one text in .*, got a.txt, b.txt"):
+        decode(path)
 
 
 def test_rows_of_240_in_forty_bits_count_time_on(tmp_path):
