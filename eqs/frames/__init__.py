@@ -10,6 +10,7 @@ from eqs.frames.interpolation import (
     LinearInterpolation,
     NetworkInterpolation,
 )
+from eqs.frames.light import Light
 from eqs.frames.luma import GreyImage, luma
 from eqs.frames.order import by_name
 from eqs.frames.remapping import View, remapped
@@ -23,6 +24,7 @@ __all__ = [
     "FrameFolder",
     "GreyImage",
     "Interpolation",
+    "Light",
     "LinearInterpolation",
     "NetworkInterpolation",
     "VideoFile",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import GreyImage, Interpolation
+from eqs.frames import GreyImage, Interpolation, Light
 from eqs.simulators.streaming.pixels import Pixels
 from eqs.simulators.streaming.readout import Readout
 from eqs.simulators.streaming.stream import Stream
@@ -34,6 +34,8 @@ class Simulator:
         mode: `fixed` mends the defects of the published program, `faithful` keeps them.
         interpolation: makes frames between those of the clip, which the model then sees as well.
         readout: makes the events wait until the sensor can send them; None sends them at once.
+        light: turns display values into light, after the frames in between were made; None takes
+            them as they are.
 
     Raises:
         ValueError: a parameter lies outside its range.
@@ -54,6 +56,7 @@ class Simulator:
     mode: str = "fixed"
     interpolation: Interpolation | None = None
     readout: Readout | None = None
+    light: Light | None = None
 
     def __post_init__(self) -> None:
         """Check the parameters every simulator has."""
@@ -72,7 +75,7 @@ class Simulator:
     def parameters(self) -> dict[str, Any]:
         """Everything that changes the events; what is not used is left out."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        for name in ("interpolation", "readout"):
+        for name in ("interpolation", "readout", "light"):
             part = values.pop(name)
             if part is not None:
                 values[name] = part.parameters()

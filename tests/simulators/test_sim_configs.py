@@ -79,7 +79,7 @@ def test_a_parameter_file_has_exactly_the_defaults(name):
     expected = {field.name: field.default for field in fields(kind)}
     if "seed" in expected:
         expected["seed"] = "${seed}"
-    for group in ("interpolation", "readout"):
+    for group in ("interpolation", "readout", "light"):
         if group in expected:
             expected[group] = f"${{oc.select:{group},null}}"
     assert values == expected

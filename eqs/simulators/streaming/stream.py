@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import WHITE, GreyImage, Interpolation, checked_frames, checked_times
+from eqs.frames import WHITE, GreyImage, Interpolation, Light, checked_frames, checked_times
 from eqs.processors import useful_bands
 from eqs.simulators.streaming.bands import BandedPixels
 from eqs.simulators.streaming.keys import MAX_PIXELS, MAX_TIME_US, ReorderBuffer, events_of, ordered
@@ -30,6 +30,9 @@ class Model(Protocol):
 
     @property
     def readout(self) -> Readout | None: ...  # noqa: D102
+
+    @property
+    def light(self) -> Light | None: ...  # noqa: D102
 
     @property
     def rounds_luma(self) -> bool: ...  # noqa: D102
@@ -159,7 +162,8 @@ class Stream:
 
     def _fired(self, frame: NDArray[Any], time_us: int) -> tuple[NDArray[np.int64], Interval]:
         """Keys of the events between the last frame and this one, and their interval."""
-        image = GreyImage.from_frame(frame, self.simulator.rounds_luma)
+        light, rounded = self.simulator.light, self.simulator.rounds_luma
+        image = (GreyImage.from_frame if light is None else light.image)(frame, rounded)
         index, self._frames_seen = self._frames_seen, self._frames_seen + 1
         if self._pixels is None:
             self._origin_us = self._last_us = time_us

@@ -1,0 +1,109 @@
+"""The light behind display values: what an event camera sees of a picture made for a screen.
+
+Source: IEC 61966-2-1 (sRGB), and ITU-R BT.709 for the luminance of linear red, green and blue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from eqs.frames.luma import GREY_LEVELS, GreyImage
+
+BT709 = (0.2126, 0.7152, 0.0722)
+WHITE_LEVEL = 255.0
+
+
+def srgb_to_linear(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Linear light of sRGB values, both in [0, 1].
+
+    Example:
+        >>> srgb_to_linear(np.array([0.0, 0.5, 1.0])).round(4).tolist()
+        [0.0, 0.214, 1.0]
+    """
+    low = values / 12.92
+    return np.where(values <= 0.04045, low, ((np.maximum(values, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def gamma22_to_linear(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Linear light of values with an exponent of 1 / 2.2, both in [0, 1]."""
+    return np.maximum(values, 0) ** 2.2
+
+
+CURVES: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+    "srgb": srgb_to_linear,
+    "gamma22": gamma22_to_linear,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light:
+    """Undoes the curve that a frame camera put its levels on, before a simulator sees them.
+
+    Convention: levels stay between 0 and 255, of which 255 is the light of white. Frames that are
+    made in between are made of display values, which is what such networks are trained on.
+
+    Args:
+        curve: `srgb` or `gamma22`.
+        black_level: level of no light; what is darker counts as that.
+        weights: `luma` undoes the curve of the grey value that the simulator computes, `bt709` that
+            of red, green and blue, and adds their light.
+
+    Raises:
+        ValueError: the curve or the weights are none of these, or nothing is brighter than black.
+    """
+
+    curve: str = "srgb"
+    black_level: float = 0.0
+    weights: str = "luma"
+
+    def __post_init__(self) -> None:
+        """Check the choices."""
+        if self.curve not in CURVES:
+            raise ValueError(
+                f"Expected a curve among {', '.join(CURVES)}, got {self.curve!r}; set light.curve"
+            )
+        if self.weights not in ("luma", "bt709"):
+            raise ValueError(
+                f"Expected weights luma or bt709, got {self.weights!r}; set light.weights"
+            )
+        if not 0 <= self.black_level < WHITE_LEVEL:
+            raise ValueError(
+                f"Expected a black level from 0 to below 255, got {self.black_level}; set "
+                "light.black_level"
+            )
+
+    def parameters(self) -> dict[str, Any]:
+        """What changes the events."""
+        return {
+            "curve": self.curve, "black_level": self.black_level, "weights": self.weights
+        }  # fmt: skip
+
+    def levels(self, levels: NDArray[Any]) -> NDArray[np.float64]:
+        """Levels of light of display levels, both 0..255.
+
+        Example:
+            >>> Light().levels(np.array([0, 188, 255])).round(1).tolist()
+            [0.0, 128.2, 255.0]
+        """
+        above = np.maximum(levels.astype(np.float64) - self.black_level, 0.0)
+        return WHITE_LEVEL * CURVES[self.curve](above / (WHITE_LEVEL - self.black_level))
+
+    def image(self, frame: NDArray[Any], rounded_luma: bool = True) -> GreyImage:
+        """The light of a checked frame, grey `(H, W)` or colour `(H, W, 3)`.
+
+        Eight bits keep their table of 256 levels, so that most frames cost nothing.
+        """
+        if frame.ndim == 3 and self.weights == "bt709":
+            table = self.levels(GREY_LEVELS)
+            eight = frame.dtype == np.uint8
+            red, green, blue = (
+                table[frame[..., k]] if eight else self.levels(frame[..., k]) for k in range(3)
+            )
+            return GreyImage.from_frame(BT709[0] * red + BT709[1] * green + BT709[2] * blue)
+        grey = GreyImage.from_frame(frame, rounded_luma)
+        return replace(grey, levels=self.levels(grey.levels))
