@@ -37,7 +37,14 @@ def test_anchors_are_means_over_the_recordings_that_have_all_of_them():
 def test_maps_are_averaged_over_recordings_of_the_shown_one_s_sensor():
     sizes = [(6, 9), (4, 4), (4, 4), (6, 9)]
     recordings = [
-        Recording(name=str(k), folder=Path(), height=h, width=w, frame_times_us=np.empty(0))
+        Recording(
+            name=str(k),
+            folder=Path(),
+            height=h,
+            width=w,
+            frame_times_us=np.empty(0),
+            events_path=Path(),
+        )
         for k, (h, w) in enumerate(sizes)
     ]
     small = np.zeros((2, 2))

@@ -8,7 +8,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 from rich.console import Console
 
-from eqs.data import RecordedEvents, Recording
+from eqs.data import Dataset, RecordedEvents, Recording
 from eqs.events import EventReader
 from eqs.pipelines import sanity as battery
 from eqs.pipelines.score import partner, score_recordings
@@ -56,10 +56,10 @@ def test_chance_is_known_wherever_another_recording_has_the_size(recordings, cfg
     assert found["n_windows"] == 3  # a quarter is warm-up
 
 
-class Data:
+class Data(Dataset):
     """A data set of these recordings."""
 
-    crop_rows = None
+    name, split_names = "these", ("test",)
 
     def __init__(self, recordings):
         self.found = recordings
