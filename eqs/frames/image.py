@@ -11,7 +11,7 @@ from PIL import Image, UnidentifiedImageError
 
 from eqs.extras import needed
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".npy")
 GREY_MODES = ("L", "1")
 COLOUR_MODES = ("RGB", "P")
 ALPHA_MODES = {"LA": "L", "PA": "RGB", "RGBA": "RGB", "La": "L", "RGBa": "RGB"}
@@ -27,7 +27,7 @@ def read_image(path: Path | str, white: float | None = None) -> NDArray[Any]:
     floating ones are float32 and keep all of their depth. Alpha is left out where all is opaque.
 
     Args:
-        path: the file.
+        path: the file; a renderer's arrays come as `.npy`, (H, W) or (H, W, 3).
         white: level that is white in floating images; whole numbers say it by their depth.
 
     Raises:
@@ -35,6 +35,8 @@ def read_image(path: Path | str, white: float | None = None) -> NDArray[Any]:
             TIFF on its side, or is floating and nobody says what is white; or OpenCV, the optional
             dependency `flow`, is not installed, which 16 bits of colour take.
     """
+    if Path(path).suffix.lower() == ".npy":
+        return _of_array(_array(path), white, path)
     try:
         with Image.open(path) as image:
             upright = _orientation(image)
@@ -54,12 +56,43 @@ def image_size(path: Path | str) -> tuple[int, int]:
     Raises:
         ValueError: the file is no readable image.
     """
+    if Path(path).suffix.lower() == ".npy":
+        height, width = _array(path).shape[:2]
+        return height, width
     try:
         with Image.open(path) as image:
             width, height = image.size
             return (width, height) if _orientation(image) in SIDEWAYS else (height, width)
     except (UnidentifiedImageError, OSError, SyntaxError) as error:
         raise ValueError(f"Expected an image at {path}, got: {error}; replace it") from error
+
+
+def _array(path: Path | str) -> NDArray[Any]:
+    """An array on disk, of which nothing is read yet."""
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise ValueError(f"Expected a readable array at {path}, got: {error}") from error
+    if not isinstance(array, np.ndarray) or array.ndim not in (2, 3) or array.shape[2:] not in (
+        (), (3,)
+    ):  # fmt: skip
+        raise ValueError(
+            f"Expected an image shaped (H, W) or (H, W, 3) in {path}, got "
+            f"{getattr(array, 'shape', 'several')}; save one frame a file"
+        )
+    return array
+
+
+def _of_array(array: NDArray[Any], white: float | None, path: Path | str) -> NDArray[Any]:
+    if array.dtype == np.uint8:
+        return np.array(array)
+    if array.dtype == np.uint16:
+        return _scaled(np.asarray(array))
+    if array.dtype.kind == "f":
+        return _levels(np.asarray(array, np.float64), white, path)
+    raise ValueError(
+        f"Expected 8 or 16 bits or floating numbers in {path}, got {array.dtype}; convert it"
+    )
 
 
 def _orientation(image: Image.Image) -> int:

@@ -102,3 +102,34 @@ def test_more_than_sixteen_bits_are_refused(tmp_path):
     Image.fromarray(np.int32([[1, 2], [3, 1 << 20]])).save(tmp_path / "a.tif")
     with pytest.raises(ValueError, match="8 or 16 bits, got 32 in"):
         read_image(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize("shape", [(4, 6), (4, 6, 3)])
+def test_arrays_of_a_renderer_are_images(tmp_path, shape):
+    values = np.random.default_rng(0).random(shape)
+    path = tmp_path / "0.npy"
+    for array, white, expected in (
+        ((values * 255).astype(np.uint8), None, (values * 255).astype(np.uint8)),
+        ((values * 65535).astype(np.uint16), None, (values * 65535).astype(np.uint16) / 257),
+        (values.astype(np.float32), 1.0, values * 255),
+    ):
+        np.save(path, array)
+        assert image_size(path) == (4, 6)
+        assert read_image(path, white) == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("array", "said"),
+    [
+        (np.zeros((4, 6), np.float32), "which level is white"),
+        (np.zeros((4, 6), np.int64), "8 or 16 bits or floating numbers in .*int64"),
+        (np.zeros((4, 6, 2), np.uint8), r"\(H, W\) or \(H, W, 3\) .*got \(4, 6, 2\)"),
+    ],
+)
+def test_arrays_that_are_no_images_are_refused(tmp_path, array, said):
+    np.save(tmp_path / "0.npy", array)
+    with pytest.raises(ValueError, match=said):
+        read_image(tmp_path / "0.npy")
+    (tmp_path / "1.npy").write_bytes(b"\x93NUMPY")
+    with pytest.raises(ValueError, match="readable array"):
+        image_size(tmp_path / "1.npy")
