@@ -15,6 +15,17 @@ if TYPE_CHECKING:
     from omegaconf import DictConfig
 
 CONFIGS = Path(__file__).parents[1] / "configs"
+# Options of Hydra that the next argument belongs to.
+WITH_VALUE = (
+    "--config-dir",
+    "-cd",
+    "--config-path",
+    "-cp",
+    "--config-name",
+    "-cn",
+    "--package",
+    "-p",
+)
 
 
 def as_typed(arguments: Sequence[str]) -> list[str]:
@@ -32,8 +43,8 @@ def with_files(arguments: Sequence[str]) -> list[str]:
     """The first two plain arguments as the files they name, simulated and real."""
     names = iter(("simulated", "real"))
     translated = []
-    for argument in arguments:
-        plain = "=" not in argument and not argument.startswith("-")
+    for before, argument in zip(("", *arguments), arguments, strict=False):
+        plain = "=" not in argument and not argument.startswith("-") and before not in WITH_VALUE
         name = next(names, None) if plain else None
         translated.append(f"{name}={argument}" if name else argument)
     return translated
