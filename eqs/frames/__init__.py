@@ -10,6 +10,7 @@ from eqs.frames.interpolation import (
     LinearInterpolation,
     NetworkInterpolation,
 )
+from eqs.frames.lens import Lens
 from eqs.frames.light import Light
 from eqs.frames.luma import GreyImage, luma
 from eqs.frames.order import by_name
@@ -24,6 +25,7 @@ __all__ = [
     "FrameFolder",
     "GreyImage",
     "Interpolation",
+    "Lens",
     "Light",
     "LinearInterpolation",
     "NetworkInterpolation",

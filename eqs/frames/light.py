@@ -1,6 +1,7 @@
 """The light behind display values: what an event camera sees of a picture made for a screen.
 
-Source: IEC 61966-2-1 (sRGB), and ITU-R BT.709 for the luminance of linear red, green and blue.
+Source: IEC 61966-2-1 (sRGB), ITU-R BT.709 for the luminance of linear red, green and blue, and
+Han et al., "Physical-Based Event Camera Simulator", ECCV 2024, for what a photodiode makes of them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ from numpy.typing import NDArray
 
 from eqs.frames.luma import GREY_LEVELS, GreyImage
 
-BT709 = (0.2126, 0.7152, 0.0722)
+LUMA = "luma"
+# What a display's red, green and blue add to the light. A photodiode's are those of a nearly flat
+# quantum efficiency from 400 to 700 nm: it sees three and a half times as much blue as the eye.
+CHANNEL_WEIGHTS = {
+    "bt709": (0.2126, 0.7152, 0.0722),
+    "photodiode": (0.317 / 0.999, 0.288 / 0.999, 0.394 / 0.999),
+}
 WHITE_LEVEL = 255.0
 
 
@@ -50,8 +57,9 @@ class Light:
     Args:
         curve: `srgb` or `gamma22`.
         black_level: level of no light; what is darker counts as that.
-        weights: `luma` undoes the curve of the grey value that the simulator computes, `bt709` that
-            of red, green and blue, and adds their light.
+        weights: `luma` undoes the curve of the grey value that the simulator computes; `bt709` and
+            `photodiode` undo that of red, green and blue, and add their light as an eye or as
+            silicon sees it.
 
     Raises:
         ValueError: the curve or the weights are none of these, or nothing is brighter than black.
@@ -59,7 +67,7 @@ class Light:
 
     curve: str = "srgb"
     black_level: float = 0.0
-    weights: str = "luma"
+    weights: str = LUMA
 
     def __post_init__(self) -> None:
         """Check the choices."""
@@ -67,9 +75,10 @@ class Light:
             raise ValueError(
                 f"Expected a curve among {', '.join(CURVES)}, got {self.curve!r}; set light.curve"
             )
-        if self.weights not in ("luma", "bt709"):
+        if self.weights not in (LUMA, *CHANNEL_WEIGHTS):
             raise ValueError(
-                f"Expected weights luma or bt709, got {self.weights!r}; set light.weights"
+                f"Expected weights among luma, {', '.join(CHANNEL_WEIGHTS)}, got "
+                f"{self.weights!r}; set light.weights"
             )
         if not 0 <= self.black_level < WHITE_LEVEL:
             raise ValueError(
@@ -98,12 +107,13 @@ class Light:
 
         Eight bits keep their table of 256 levels, so that most frames cost nothing.
         """
-        if frame.ndim == 3 and self.weights == "bt709":
-            table = self.levels(GREY_LEVELS)
-            eight = frame.dtype == np.uint8
-            red, green, blue = (
-                table[frame[..., k]] if eight else self.levels(frame[..., k]) for k in range(3)
-            )
-            return GreyImage.from_frame(BT709[0] * red + BT709[1] * green + BT709[2] * blue)
+        if frame.ndim == 3 and self.weights != LUMA:
+            weights = CHANNEL_WEIGHTS[self.weights]
+            if frame.dtype == np.uint8:
+                table = self.levels(GREY_LEVELS)
+                light = [weights[k] * table[frame[..., k]] for k in range(3)]
+            else:
+                light = [weights[k] * self.levels(frame[..., k]) for k in range(3)]
+            return GreyImage.from_frame(light[0] + light[1] + light[2])
         grey = GreyImage.from_frame(frame, rounded_luma)
         return replace(grey, levels=self.levels(grey.levels))

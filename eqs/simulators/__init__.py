@@ -10,6 +10,7 @@ from eqs.simulators.esim import CARLA, ESIM, Vid2E
 from eqs.simulators.gazebo import Gazebo
 from eqs.simulators.icns import ICNS
 from eqs.simulators.improved_esim import ImprovedESIM
+from eqs.simulators.pecs import PECS
 from eqs.simulators.pix2nvs import PIX2NVS
 from eqs.simulators.pixel.crossing import fire_levels, firing_pixels
 from eqs.simulators.pixel.photoreceptor import filter_share, lin_log, log_intensity
@@ -33,6 +34,7 @@ __all__ = [
     "CARLA",
     "ESIM",
     "ICNS",
+    "PECS",
     "PIX2NVS",
     "V2E",
     "Bottleneck",

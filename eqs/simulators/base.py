@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import GreyImage, Interpolation, Light
+from eqs.frames import GreyImage, Interpolation, Lens, Light
 from eqs.simulators.streaming.pixels import Pixels
 from eqs.simulators.streaming.readout import Readout
 from eqs.simulators.streaming.stream import Stream
@@ -36,6 +36,7 @@ class Simulator:
         readout: makes the events wait until the sensor can send them; None sends them at once.
         light: turns display values into light, after the frames in between were made; None takes
             them as they are.
+        lens: stands before the pixels; None lets them see each image as it is.
 
     Raises:
         ValueError: a parameter lies outside its range.
@@ -57,11 +58,17 @@ class Simulator:
     interpolation: Interpolation | None = None
     readout: Readout | None = None
     light: Light | None = None
+    lens: Lens | None = None
 
     def __post_init__(self) -> None:
         """Check the parameters every simulator has."""
         if self.mode not in MODES:
             raise ValueError(f"Expected mode fixed or faithful, got {self.mode!r}; set sim.mode")
+        if self.mode not in self.pixels:
+            raise ValueError(
+                f"Expected mode fixed for {self.name}, got faithful, as it follows no published "
+                "program; set sim.mode=fixed"
+            )
 
     @property
     def stochastic(self) -> bool:
@@ -75,7 +82,7 @@ class Simulator:
     def parameters(self) -> dict[str, Any]:
         """Everything that changes the events; what is not used is left out."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        for name in ("interpolation", "readout", "light"):
+        for name in ("interpolation", "readout", "light", "lens"):
             part = values.pop(name)
             if part is not None:
                 values[name] = part.parameters()

@@ -1,6 +1,7 @@
 """Light behind display values: the curves, what they cost nothing for, and what simulators see."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,14 @@ from eqs import simulators
 from eqs.frames import GreyImage, Light
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.scenes.camera import tone_curve
-from eqs.simulators import ESIM, Simulator
+from eqs.simulators import ESIM, PECS, Simulator
 
 KINDS = [
     kind for kind in vars(simulators).values()
     if isinstance(kind, type) and issubclass(kind, Simulator) and "name" in vars(kind)
 ]  # fmt: skip
+
+LIT = (PECS,)  # those that begin with the light
 
 
 def test_the_curve_undoes_that_of_the_rendered_camera():
@@ -45,8 +48,9 @@ def test_colours_add_their_light():
     image = Light(weights="bt709").image(frame)
     assert image.levels[image.codes] == pytest.approx([255 * w for w in (0.2126, 0.7152, 0.0722)])
     grey = np.full((2, 2, 3), 100, np.uint8)
-    both = [Light(weights=name).image(grey) for name in ("luma", "bt709")]
-    assert both[0].levels[both[0].codes] == pytest.approx(both[1].levels[both[1].codes])
+    seen = [Light(weights=name).image(grey) for name in ("luma", "bt709", "photodiode")]
+    for other in seen[1:]:
+        assert other.levels[other.codes] == pytest.approx(seen[0].levels[seen[0].codes])
 
 
 @pytest.mark.parametrize("display", [40, 90, 160])
@@ -70,7 +74,8 @@ def test_every_simulator_takes_light_and_says_so(kind):
     frames = generator.integers(20, 230, (4, 12, 16)).astype(np.uint8)
     times = 20_000 * np.arange(4)
     plain, lit = kind(), kind(light=Light())
-    assert "light" not in plain.parameters()
+    assert ("light" in plain.parameters()) == (kind in LIT)
+    plain = replace(plain, light=None)
     assert lit.parameters()["light"] == Light().parameters()
     linear = Light().levels(frames.astype(np.float64))
     found = lit.simulate(frames, times, white=255)

@@ -11,11 +11,13 @@ from hydra.errors import MissingConfigException
 from hydra.utils import instantiate
 
 from eqs.data import RecordedEvents
+from eqs.frames import Lens, Light
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.simulators import (
     CARLA,
     ESIM,
     ICNS,
+    PECS,
     PIX2NVS,
     V2E,
     Bottleneck,
@@ -40,7 +42,10 @@ SIMULATORS = {
     "icns": ICNS,
     "improved_esim": ImprovedESIM,
     "vid2e": Vid2E,
+    "pecs": PECS,
 }
+GROUPS = ("interpolation", "readout", "light", "lens")
+LIT = {"pecs": Light(weights="photodiode")}  # those that begin with the light
 READOUTS = {"bottleneck": Bottleneck, "row": RowReadout, "synchronous": SynchronousReadout}
 SETTINGS = sorted(
     path.relative_to(CONFIGS / "sim").with_suffix("").as_posix()
@@ -60,7 +65,7 @@ def stated(name):
     files = [CONFIGS / "base" / "simulator.yaml", CONFIGS / "sim" / f"{name}.yaml"]
     read = [yaml.safe_load(path.read_text()) for path in files]
     assert read[1].pop("defaults") == ["/base/simulator@_here_", "_self_"]
-    assert not read[0].keys() & read[1].keys()
+    assert read[0].keys() & read[1].keys() == ({"light"} if name in LIT else set())
     return {**read[0], **read[1]}
 
 
@@ -79,9 +84,11 @@ def test_a_parameter_file_has_exactly_the_defaults(name):
     expected = {field.name: field.default for field in fields(kind)}
     if "seed" in expected:
         expected["seed"] = "${seed}"
-    for group in ("interpolation", "readout", "light"):
-        if group in expected:
-            expected[group] = f"${{oc.select:{group},null}}"
+    expected |= {group: f"${{oc.select:{group},null}}" for group in GROUPS}
+    if expected_light := LIT.get(name):
+        expected["light"] = values["light"]
+        assert instantiate(composed(f"sim={name}").sim).light == expected_light
+        assert instantiate(composed(f"sim={name}", "light=none").sim).light is None
     assert values == expected
     assert {key: type(value) for key, value in values.items()} == {
         key: type(value) for key, value in expected.items()
@@ -125,6 +132,13 @@ def test_a_readout_holds_for_every_simulator_of_an_evaluation():
         cfg = compose("evaluate", ["readout=row", "readout.service_us=3"])
     for simulator in cfg.simulators.values():
         assert instantiate(simulator).readout == RowReadout(service_us=3)
+
+
+def test_a_lens_stands_before_every_simulator():
+    with initialize_config_dir(str(CONFIGS), version_base="1.3"):
+        cfg = compose("evaluate", ["lens=thin", "lens.blur_px=1"])
+    for simulator in cfg.simulators.values():
+        assert instantiate(simulator).lens == Lens(blur_px=1)
 
 
 def test_every_simulator_has_a_parameter_file():

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from eqs.events import Events
-from eqs.frames import LinearInterpolation
+from eqs.frames import Lens, LinearInterpolation
 from eqs.processors import useful_bands
 from eqs.simulators import (
     CARLA,
     ESIM,
     ICNS,
+    PECS,
     PIX2NVS,
     V2E,
     DVSVoltmeter,
@@ -54,6 +55,8 @@ SIMULATORS = [
     ImprovedESIM(order=0, refractory_us=900, threshold_on_log=0.1),
     ImprovedESIM(mode="faithful", threshold_on_log=0.1, refractory_us=9000, order=2),
     Vid2E(),
+    PECS(),
+    PECS(time_constant_us=3000.0, light=None, lens=Lens(blur_px=0.0), seed=7),
 ]
 SILENT = [
     ESIM(),
@@ -77,6 +80,7 @@ SILENT = [
     ICNS(background_on_hz=0, background_off_hz=0, mode="faithful"),
     ImprovedESIM(order=3),
     ImprovedESIM(mode="faithful", leak_hz=2),
+    PECS(background_on_hz=0, background_off_hz=0),
 ]
 MISMATCH_ALONE = {("esim", "fixed"), ("carla", "fixed")}
 FIELDS = ("t", "x", "y", "p")
@@ -190,7 +194,7 @@ def test_the_order_is_time_row_column(simulator, walk):
 def test_events_lie_within_the_clip(simulator, walk):
     frames, times = walk
     events = simulator.simulate(frames, times)
-    delay = {"icns": 10_000}.get(simulator.name, 0)  # its longest latency
+    delay = {"icns": 10_000, "pecs": 10_000}.get(simulator.name, 0)  # its longest latency
     if simulator.name == "pix2nvs" and simulator.mode == "faithful":
         delay = times[-1] - times[-2]
     assert events.t[0] >= times[0]
@@ -296,6 +300,7 @@ def test_a_stream_without_frames_cannot_finish():
         (ICNS, {"threshold_on_log": 0}),
         (ICNS, {"time_constant_us": 0}),
         (ICNS, {"white_lux": 0}),
+        (PECS, {"mode": "faithful"}),
         (ICNS, {"background_on_hz": -1}),
         (ImprovedESIM, {"order": 1}),
         (ImprovedESIM, {"dark_current_fa": 0}),

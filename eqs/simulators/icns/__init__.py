@@ -6,4 +6,4 @@ from eqs.simulators.icns.parameters import ICNS
 
 ICNS.pixels = {"fixed": ICNSPixels, "faithful": FaithfulICNSPixels}
 
-__all__ = ["ICNS"]
+__all__ = ["ICNS", "ICNSPixels"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import WHITE, GreyImage, Interpolation, Light, checked_frames, checked_times
+from eqs.frames import WHITE, GreyImage, Interpolation, Lens, Light, checked_frames, checked_times
 from eqs.processors import useful_bands
 from eqs.simulators.streaming.bands import BandedPixels
 from eqs.simulators.streaming.keys import MAX_PIXELS, MAX_TIME_US, ReorderBuffer, events_of, ordered
@@ -33,6 +33,9 @@ class Model(Protocol):
 
     @property
     def light(self) -> Light | None: ...  # noqa: D102
+
+    @property
+    def lens(self) -> Lens | None: ...  # noqa: D102
 
     @property
     def rounds_luma(self) -> bool: ...  # noqa: D102
@@ -162,8 +165,7 @@ class Stream:
 
     def _fired(self, frame: NDArray[Any], time_us: int) -> tuple[NDArray[np.int64], Interval]:
         """Keys of the events between the last frame and this one, and their interval."""
-        light, rounded = self.simulator.light, self.simulator.rounds_luma
-        image = (GreyImage.from_frame if light is None else light.image)(frame, rounded)
+        image = self._seen(frame)
         index, self._frames_seen = self._frames_seen, self._frames_seen + 1
         if self._pixels is None:
             self._origin_us = self._last_us = time_us
@@ -174,6 +176,14 @@ class Stream:
         interval = Interval(index, self._last_us - self._origin_us, time_us - self._origin_us)
         self._last_us = time_us
         return self._pixels.advance(image, interval).copy(), interval
+
+    def _seen(self, frame: NDArray[Any]) -> GreyImage:
+        """What reaches the pixels of a frame."""
+        light, lens = self.simulator.light, self.simulator.lens
+        image = (GreyImage.from_frame if light is None else light.image)(
+            frame, self.simulator.rounds_luma
+        )
+        return image if lens is None else lens.seen(image)
 
     def _first_pixels(self, image: GreyImage) -> Pixels:
         begin = partial(self.simulator.begin, sequence=self.sequence)
