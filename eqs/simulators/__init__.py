@@ -4,6 +4,7 @@
 bands, keys, order, readout. Whoever writes a simulator finds all of it here.
 """
 
+from eqs.simulators.adv2e import ADV2E
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.dvs_voltmeter import DVSVoltmeter
 from eqs.simulators.esim import CARLA, ESIM, Vid2E
@@ -31,6 +32,7 @@ from eqs.simulators.streaming.stream import Stream
 from eqs.simulators.v2e import V2E
 
 __all__ = [
+    "ADV2E",
     "CARLA",
     "ESIM",
     "ICNS",

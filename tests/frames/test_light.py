@@ -12,14 +12,14 @@ from eqs import simulators
 from eqs.frames import GreyImage, Light
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.scenes.camera import tone_curve
-from eqs.simulators import ESIM, PECS, Simulator
+from eqs.simulators import ADV2E, ESIM, PECS, Simulator
 
 KINDS = [
     kind for kind in vars(simulators).values()
     if isinstance(kind, type) and issubclass(kind, Simulator) and "name" in vars(kind)
 ]  # fmt: skip
 
-LIT = (PECS,)  # those that begin with the light
+LIT = (PECS, ADV2E)  # those that begin with the light
 
 
 def test_the_curve_undoes_that_of_the_rendered_camera():

@@ -22,7 +22,9 @@ ROOMS = {
     "eqs.drawing": "events extras files names",
     "eqs.simulators.streaming": "events frames processors",
     "eqs.simulators.pixel": "frames processors simulators.streaming",
-    "eqs.simulators": "events frames simulators.pixel simulators.streaming",
+    "eqs.simulators.pixel.filtered": "frames simulators.pixel simulators.streaming",
+    "eqs.simulators": "events frames simulators.pixel simulators.pixel.filtered "
+    "simulators.streaming",
     "eqs.scenes": "events files processors",
     "eqs.data": "content events files frames processors simulators",
     "eqs.models": "",

@@ -14,6 +14,7 @@ from eqs.data import RecordedEvents
 from eqs.frames import Lens, Light
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.simulators import (
+    ADV2E,
     CARLA,
     ESIM,
     ICNS,
@@ -43,9 +44,10 @@ SIMULATORS = {
     "improved_esim": ImprovedESIM,
     "vid2e": Vid2E,
     "pecs": PECS,
+    "adv2e": ADV2E,
 }
 GROUPS = ("interpolation", "readout", "light", "lens")
-LIT = {"pecs": Light(weights="photodiode")}  # those that begin with the light
+LIT = {"pecs": Light(weights="photodiode"), "adv2e": Light()}  # those that begin with the light
 READOUTS = {"bottleneck": Bottleneck, "row": RowReadout, "synchronous": SynchronousReadout}
 SETTINGS = sorted(
     path.relative_to(CONFIGS / "sim").with_suffix("").as_posix()
