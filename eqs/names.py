@@ -5,3 +5,6 @@ REFERENCE = "real"
 
 BASELINE = "baseline_"
 """What the column of a baseline begins with."""
+
+MARK = "†"
+"""Ends the name of a system that is no simulator like others, for a reason that notes give."""

@@ -7,23 +7,32 @@ after.
 
 from __future__ import annotations
 
+import atexit
+import shutil
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from rich.console import Console
 from rich.table import Table
 
 from eqs import simulators
 from eqs.benchmarks.timing import Cost, in_own_process, time_runs
 from eqs.frames import FrameFolder, image_paths
+from eqs.models.volumes import VolumeGenerator
+from eqs.simulators.learned import FOLDS
 
 NAMES = tuple(
     name
     for name, kind in vars(simulators).items()
-    if isinstance(kind, type) and issubclass(kind, simulators.Simulator) and "name" in vars(kind)
+    if isinstance(kind, type)
+    and issubclass(kind, simulators.Simulator)
+    and "name" in vars(kind)
+    and kind is not simulators.VolumeNetwork  # whose network is the user's
 )
 THRESHOLDS_LOG = (0.2, 0.02)
 CONTRAST = {"threshold_on_log", "threshold_off_log", "threshold_log"}
@@ -56,11 +65,33 @@ def has_threshold(name: str) -> bool:
 def configured(name: str, threshold_log: float) -> Any:  # noqa: ANN401 - one of many classes
     """The simulator with all its mean thresholds at one value, if it has such, else as it is."""
     kind = getattr(simulators, name)
+    if kind is simulators.EventGAN:
+        return kind(network=random_networks())
     names = {field.name for field in fields(kind)}
     values = dict.fromkeys(CONTRAST & names, threshold_log)
     if "threshold_min_log" in names:
         values["threshold_min_log"] = threshold_log
     return kind(**values)
+
+
+def random_networks() -> simulators.Learning:
+    """Networks that learned nothing, which takes as long to ask; they go with this process."""
+    root = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, root, ignore_errors=True)
+    learning = simulators.Learning(teacher=Untaught(), root=root)
+    for fold in range(FOLDS):
+        torch.manual_seed(fold)
+        learning.keep(fold, VolumeGenerator(learning.width).state_dict())
+    learning.finish({"teacher": learning.taught_by.name, "folds": [[], []], "val": []})
+    return learning
+
+
+@dataclass(frozen=True)
+class Untaught:
+    """No data set."""
+
+    name: str = "nothing"
+    sensor_hash: str | None = None
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,9 @@ CONFIGURED = {
     "evaluate": Configured(
         config="evaluate", module="evaluate", pipeline="evaluate", translate=with_flags
     ),
+    "train-simulator": Configured(
+        config="train-simulator", module="train_simulator", pipeline="train_simulator"
+    ),
     "prepare": Configured(config="prepare", module="prepare", pipeline="prepare"),
     "simulate": Configured(config="simulate", module="simulate", pipeline="simulate"),
     "score": Configured(

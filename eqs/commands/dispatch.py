@@ -71,7 +71,7 @@ def _run(verb: str, arguments: Sequence[str], shown: str) -> None:
 def overview() -> str:
     """What `eqs` alone prints."""
     verbs = {verb: purpose(command.config) for verb, command in CONFIGURED.items()} | PLAIN
-    lines = [f"  {verb:<11}{text}" for verb, text in verbs.items()]
+    lines = [f"  {verb:<17}{text}" for verb, text in verbs.items()]
     return "\n".join(
         [
             "How real is simulated event-camera data, and does it matter to a detector?",

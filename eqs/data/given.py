@@ -95,6 +95,11 @@ class GivenStreams:
         """The simulator's name, marked as one that did not run here."""
         return f"{self.given.name} (given)"
 
+    @property
+    def caveat(self) -> str:
+        """None is known of a program that did not run here."""
+        return ""
+
     @cached_property
     def label(self) -> str:
         """Name and a hash of what the files hold, hidden ones left out."""

@@ -95,6 +95,11 @@ class MixedEvents:
         return "_".join(["mix", *shown])
 
     @property
+    def caveat(self) -> str:
+        """A mix has no score, and is no point of a correlation anyway."""
+        return ""
+
+    @property
     def label(self) -> str:
         """Name and a hash of streams and shares, and of the seed where it chooses recordings."""
         mixed = {name: share for name, share in self.shares.items() if share}

@@ -32,6 +32,10 @@ class EventSource(Protocol):
     def label(self) -> str:
         """Name of this very stream: differs whenever the events could differ."""
 
+    @property
+    def caveat(self) -> str:
+        """Why it is no stream of a simulator like others; empty where it is one."""
+
     def prepare(self, recordings: Sequence[Recording]) -> None:
         """Make every file that `path` will name."""
 
@@ -45,6 +49,7 @@ class RecordedEvents:
 
     name: str = "real"
     label: str = "real"
+    caveat: str = ""
 
     def prepare(self, recordings: Sequence[Recording]) -> None:
         """Nothing to make: the files came with the recordings."""
@@ -82,6 +87,11 @@ class SimulatedEvents:
         """Name and parameter hash, unique for what would be simulated."""
         identity = [self.simulator.parameters(), self.simulator.version]
         return f"{self.simulator.name}-{short_hash(identity)}"
+
+    @property
+    def caveat(self) -> str:
+        """What speaks against its simulator on this data set, whose name its folder has."""
+        return self.simulator.caveat(self.root.name)
 
     def path(self, recording: Recording) -> Path:
         """Where the recording's simulated events lie, in DSEC layout."""

@@ -17,6 +17,7 @@ from eqs.data import (
     RecordedEvents,
     SimulatedEvents,
 )
+from eqs.pipelines.train_simulator import ensure_learned
 from eqs.simulators import Simulator
 
 
@@ -27,6 +28,7 @@ def event_source(simulator: DictConfig, cfg: DictConfig) -> EventSource:
         ValueError: it is none of these.
     """
     built = instantiate(simulator)
+    ensure_learned(built)
     root = Path(cfg.paths.simulated) / cfg.data.name
     return mixed(built, root) if isinstance(built, Mix) else source_of(built, root)
 

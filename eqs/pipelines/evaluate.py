@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from eqs.data import Dataset, EventSource, MixedEvents
 from eqs.drawing import save_figure
 from eqs.files import short_hash
 from eqs.metrics.grid import fewest_windows
-from eqs.names import BASELINE
+from eqs.names import BASELINE, MARK
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.judge import require_judge
@@ -105,7 +105,7 @@ def comparable_runs(cfg: DictConfig, found: Sequence[Run]) -> list[Run]:
 
 def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
     """One row per run, as `study.csv` wants it."""
-    names = short_names([(run.result.simulator, run.result.system) for run in runs])
+    names = run_names(runs)
     rows = []
     for run in runs:
         result, own, real = run.result, run.result.own, run.result.real
@@ -127,15 +127,28 @@ def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
                 "real_share": result.real_share,
                 "beside": result.beside,
                 "before": result.before,
+                "caveat": result.caveat,
             }
         )
     return rows
 
 
-def short_names(systems: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """What to call each system: its simulator's name, or its label where settings compete."""
+def short_names(systems: Sequence[tuple[str, str]], marked: Collection[str] = ()) -> dict[str, str]:
+    """What to call each system: its simulator's name, or its label where settings compete.
+
+    Args:
+        systems: name of the simulator and label of the stream.
+        marked: labels of those that are no simulators like others, whose names end in a mark.
+    """
     settings = Counter(name for name, _ in set(systems))
-    return {label: name if settings[name] == 1 else label for name, label in systems}
+    names = {label: name if settings[name] == 1 else label for name, label in systems}
+    return {label: name + MARK * (label in marked) for label, name in names.items()}
+
+
+def run_names(runs: Sequence[Run]) -> dict[str, str]:
+    """What to call the system of each run."""
+    marked = {run.result.system for run in runs if run.result.caveat}
+    return short_names([(run.result.simulator, run.result.system) for run in runs], marked)
 
 
 def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console) -> None:
@@ -149,11 +162,18 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
         source.prepare(recordings)
     with times.measure("score"):
         scores = score_recordings(scoring, recordings, systems, data.crop_rows)
-    rows = [{"simulator": systems[row["system"]].name, **row} for row in scores.rows]
+    rows = [
+        {
+            "simulator": systems[row["system"]].name,
+            "caveat": systems[row["system"]].caveat,
+            **row,
+        }
+        for row in scores.rows
+    ]
     table = eqs_table(rows)
     with times.measure("reverse mAP"):
         study = with_reverse(study_rows(runs), runs, data, systems)
-    names = short_names([(run.result.simulator, run.result.system) for run in runs])
+    names = run_names(runs)
     found = Findings(
         recordings=recordings,
         judge=scoring.judge,
@@ -201,5 +221,6 @@ def scored_systems(cfg: DictConfig, runs: Sequence[Run]) -> Mapping[str, EventSo
         raise ValueError("Expected simulators to score, got a mix; take sim=mix out of simulators")
     trained = [event_source(run.config().sim, cfg) for run in runs if run.result.plain]
     sources = {s.label: s for s in [*configured, *trained] if s.name != "real"}
-    names = short_names([(source.name, label) for label, source in sources.items()])
+    marked = {label for label, source in sources.items() if source.caveat}
+    names = short_names([(source.name, label) for label, source in sources.items()], marked)
     return {names[label]: source for label, source in sources.items()}

@@ -30,6 +30,7 @@ class RunResult:
         seconds: how long training and testing took, as far as this process did them.
         stages: what the detector was trained on, one after the other; more than one where it
             started from the weights of another run.
+        caveat: why its simulator is none like others; empty where it is one.
     """
 
     simulator: str
@@ -42,6 +43,7 @@ class RunResult:
     protocol: dict[str, Any]
     seconds: float
     stages: tuple[Stage, ...]
+    caveat: str = ""
 
     @property
     def plain(self) -> bool:
@@ -83,6 +85,7 @@ class RunResult:
         try:
             own, real = (Accuracy(**record[stream]) for stream in ("own", "real"))
             record.setdefault("stages", [{record["simulator"]: 1.0}])  # before there were others
+            record.setdefault("caveat", "")
             kept = {field.name: record[field.name] for field in fields(cls)}
         except (KeyError, TypeError) as error:
             raise ValueError(

@@ -175,6 +175,7 @@ def finish(
     job.run.finish(
         RunResult(
             **trained_as(job.source, job.start),
+            caveat=job.source.caveat,
             seed=job.cfg.seed,
             recipe=recipe_hash(job.cfg),
             data=job.identity["data"],

@@ -6,11 +6,13 @@ bands, keys, order, readout. Whoever writes a simulator finds all of it here.
 
 from eqs.simulators.adv2e import ADV2E
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
+from eqs.simulators.dvs_pixel import DVSPixel
 from eqs.simulators.dvs_voltmeter import DVSVoltmeter
 from eqs.simulators.esim import CARLA, ESIM, Vid2E
 from eqs.simulators.gazebo import Gazebo
 from eqs.simulators.icns import ICNS
 from eqs.simulators.improved_esim import ImprovedESIM
+from eqs.simulators.learned import EventGAN, Learning, VolumeNetwork
 from eqs.simulators.pecs import PECS
 from eqs.simulators.pix2nvs import PIX2NVS
 from eqs.simulators.pixel.crossing import fire_levels, firing_pixels
@@ -40,10 +42,13 @@ __all__ = [
     "PIX2NVS",
     "V2E",
     "Bottleneck",
+    "DVSPixel",
     "DVSVoltmeter",
+    "EventGAN",
     "Gazebo",
     "ImprovedESIM",
     "Interval",
+    "Learning",
     "Pixels",
     "Prophesee",
     "Readout",
@@ -52,6 +57,7 @@ __all__ = [
     "Stream",
     "SynchronousReadout",
     "Vid2E",
+    "VolumeNetwork",
     "draw_key",
     "event_key",
     "filter_share",

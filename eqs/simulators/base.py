@@ -75,6 +75,16 @@ class Simulator:
         """Whether the events depend on the seed."""
         return False
 
+    def caveat(self, judge: str) -> str:
+        """Why it is no simulator like others where a data set judges it; empty where it is one.
+
+        Its rows are then marked, with this sentence's end below, and no point of a correlation.
+
+        Args:
+            judge: name of the data set.
+        """
+        return ""
+
     def begin(self, image: GreyImage, sequence: str) -> Pixels:
         """The pixels after the first frame of a sequence."""
         return self.pixels[self.mode](self, image, sequence)

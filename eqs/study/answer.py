@@ -12,6 +12,7 @@ from eqs.names import REFERENCE
 from eqs.study.correlation import SIMULATORS_NEEDED, Correlation
 from eqs.study.tables import (
     RATIO_FLOOR,
+    independent,
     simulated,
     summarise_eqs,
     summarise_study,
@@ -37,7 +38,7 @@ def answer(
         )
     systems = summarise_study(study)
     sentences.append(_accuracy(systems))
-    sentences.append(_foreseen(simulated(systems), results))
+    sentences.append(_foreseen(independent(simulated(systems)), results))
     return tuple(sentences)
 
 

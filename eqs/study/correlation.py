@@ -27,7 +27,7 @@ from eqs.study.statistics import (
     smallest_p,
     spearman,
 )
-from eqs.study.tables import simulated, summarise_study
+from eqs.study.tables import independent, simulated, summarise_study
 
 SIMULATORS_NEEDED = 8
 """Below this many simulators a relation is reported as points, without a conclusion."""
@@ -183,7 +183,7 @@ def correlations(
     """Hold each score against each target over the simulated systems of a study.
 
     The system trained on real events is left out: it is the upper bound, and one far point would
-    make the rest look ordered.
+    make the rest look ordered. So are marked systems, which are no simulators like others.
 
     Args:
         study: one row per (system, seed).
@@ -192,7 +192,7 @@ def correlations(
         targets: what to hold them against.
         seed: of drawn permutations and of resampling.
     """
-    systems = summarise_study(simulated(study))
+    systems = summarise_study(independent(simulated(study)))
     return [
         correlate(systems, score=score, target=target, seed=seed)
         for score in scores
@@ -236,7 +236,8 @@ def write_correlations(results: Sequence[Correlation], path: Path | str) -> Path
     """Write `correlation.json`: the rule that words a result, and every result."""
     content = {
         "rule": f"A conclusion needs at least {SIMULATORS_NEEDED} simulators, two training seeds "
-        "and an interval without zero; the system trained on real events is never a point.",
+        "and an interval without zero; the system trained on real events and marked systems are "
+        "never points.",
         "results": [result.as_dict() for result in results],
     }
     return write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", Path(path))

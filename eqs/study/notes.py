@@ -31,8 +31,21 @@ def notes(eqs: pd.DataFrame, fewest: int = 2) -> tuple[str, ...]:
             f"Chance, ceiling and eqs_scaled cover {anchored} of {shared} sequences, those for "
             "which both are known, and eqs_scaled follows from the scores of these alone."
         )
+    found.extend(marks(eqs))
     few = few_windows(scored_windows(eqs), fewest)
     return (*found, few) if few else tuple(found)
+
+
+def marks(table: pd.DataFrame) -> list[str]:
+    """What the mark of each marked system stands for; nothing where there is none."""
+    if "caveat" not in table:
+        return []
+    caveats = table.groupby("system", sort=False)["caveat"].first().fillna("")
+    return [
+        f"{name}: {caveat}, so it is no point of a correlation."
+        for name, caveat in caveats.items()
+        if caveat
+    ]
 
 
 def scored_windows(eqs: pd.DataFrame) -> dict[str, int]:

@@ -58,7 +58,7 @@ EQS_COLUMNS = (
 TEXT_COLUMNS = frozenset(
     {"simulator", "system", "sequence", "split", "corruption", "anchor"}
     | {"definition", "weights_sha256", "protocol", "recipe", "data"}
-    | {"trained_on", "beside", "before"}
+    | {"trained_on", "beside", "before", "caveat"}
 )
 COUNT_COLUMNS = ("n_windows", "n_events_real", "n_events_sim")
 TIME_COLUMNS = ("start_us", "stop_us")
@@ -203,8 +203,9 @@ def summarise_study(study: pd.DataFrame) -> pd.DataFrame:
     means[list(Drops._fields)] = _lost(means)
     means.insert(0, "simulator", groups["simulator"].first())
     means.insert(1, "seeds", groups["seed"].nunique())
-    if "trained_on" in study:
-        means.insert(1, "trained_on", groups["trained_on"].first())
+    for name in ("trained_on", "caveat"):
+        if name in study:
+            means.insert(1, name, groups[name].first())
     return means.reset_index()
 
 
@@ -232,7 +233,7 @@ def summarise_eqs(scores: pd.DataFrame) -> pd.DataFrame:
     means[counted] = means[counted].fillna(0).astype(int)
     for name in COUNT_COLUMNS:
         means[name] = groups[name].sum(min_count=1)
-    for name in ("definition", "weights_sha256"):
+    for name in ("definition", "weights_sha256", *(["caveat"] if "caveat" in scores else [])):
         means[name] = systems[name].first()
     return means.reset_index()
 
@@ -243,6 +244,13 @@ def simulated(table: pd.DataFrame) -> pd.DataFrame:
     Neither is a detector that saw several streams, or a part of one: no stream of it has a score.
     """
     return table[(table["simulator"] != REFERENCE) & ~composed(table)]
+
+
+def independent(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of simulators that are ones like others, without the caveat of a marked row."""
+    if "caveat" not in table:
+        return table
+    return table[table["caveat"].fillna("") == ""]
 
 
 def composed(table: pd.DataFrame) -> pd.Series:

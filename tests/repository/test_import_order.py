@@ -24,16 +24,19 @@ ROOMS = {
     "eqs.simulators.pixel": "frames processors simulators.streaming",
     "eqs.simulators.pixel.filtered": "frames simulators.pixel simulators.streaming",
     "eqs.simulators": "events frames simulators.pixel simulators.pixel.filtered "
+    "simulators.streaming simulators.learned",
+    "eqs.simulators.learned": "files frames models simulators simulators.pixel "
     "simulators.streaming",
     "eqs.scenes": "events files processors",
     "eqs.data": "content events files frames processors simulators",
     "eqs.models": "",
     "eqs.metrics.baselines": "events metrics",
     "eqs.metrics": "events extras files models representations",
-    "eqs.training": "content data drawing events files metrics models representations",
+    "eqs.training": "content data drawing events files frames metrics models representations "
+    "simulators.learned",
     "eqs.study": "drawing files names",
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
-    "models names processors simulators study training",
+    "models names processors simulators simulators.learned study training",
     "eqs.benchmarks": "data events frames metrics models representations simulators training",
     "eqs.commands": "benchmarks data drawing events extras files pipelines",
     "eqs.__main__": "commands",

@@ -22,9 +22,12 @@ from eqs.simulators import (
     PIX2NVS,
     V2E,
     Bottleneck,
+    DVSPixel,
     DVSVoltmeter,
+    EventGAN,
     Gazebo,
     ImprovedESIM,
+    Learning,
     Prophesee,
     RowReadout,
     SynchronousReadout,
@@ -45,9 +48,15 @@ SIMULATORS = {
     "vid2e": Vid2E,
     "pecs": PECS,
     "adv2e": ADV2E,
+    "eventgan": EventGAN,
+    "dvs_pixel": DVSPixel,
 }
 GROUPS = ("interpolation", "readout", "light", "lens")
-LIT = {"pecs": Light(weights="photodiode"), "adv2e": Light()}  # those that begin with the light
+LIT = {
+    "pecs": Light(weights="photodiode"),
+    "adv2e": Light(),
+    "dvs_pixel": Light(),
+}  # those that begin with the light
 READOUTS = {"bottleneck": Bottleneck, "row": RowReadout, "synchronous": SynchronousReadout}
 SETTINGS = sorted(
     path.relative_to(CONFIGS / "sim").with_suffix("").as_posix()
@@ -66,7 +75,8 @@ def stated(name):
     """What a simulator's file and the one that it builds on say."""
     files = [CONFIGS / "base" / "simulator.yaml", CONFIGS / "sim" / f"{name}.yaml"]
     read = [yaml.safe_load(path.read_text()) for path in files]
-    assert read[1].pop("defaults") == ["/base/simulator@_here_", "_self_"]
+    first, *_, last = read[1].pop("defaults")
+    assert (first, last) == ("/base/simulator@_here_", "_self_")
     assert read[0].keys() & read[1].keys() == ({"light"} if name in LIT else set())
     return {**read[0], **read[1]}
 
@@ -83,7 +93,9 @@ def test_a_parameter_file_has_exactly_the_defaults(name):
     values = stated(name)
     assert values.pop("_target_") == f"eqs.simulators.{kind.__name__}"
     assert kind.name == name
-    expected = {field.name: field.default for field in fields(kind)}
+    if name == "eventgan":
+        check_learning(values.pop("network"))
+    expected = {field.name: field.default for field in fields(kind) if field.name in values}
     if "seed" in expected:
         expected["seed"] = "${seed}"
     expected |= {group: f"${{oc.select:{group},null}}" for group in GROUPS}
@@ -97,12 +109,20 @@ def test_a_parameter_file_has_exactly_the_defaults(name):
     }
 
 
+def check_learning(values):
+    assert values.pop("_target_") == "eqs.simulators.Learning"
+    assert values.pop("root") == "${paths.runs}/simulators"
+    defaults = {field.name: field.default for field in fields(Learning)}
+    assert {**values, "teacher": None, "root": None} == {**defaults, "teacher": None, "root": None}
+
+
 @pytest.mark.parametrize("file", ["base/simulator", *(f"sim/{name}" for name in SIMULATORS)])
 def test_every_parameter_has_a_comment_with_source_and_range(file):
     lines = (CONFIGS / f"{file}.yaml").read_text().splitlines()
     for above, line in pairwise(lines):
-        if line and not line.startswith(("#", "_target_", "mode", "seed", "defaults", "  - ")):
-            assert above.startswith("# "), line
+        named = line.strip()
+        if named and not named.startswith(("#", "_target_", "mode", "seed", "defaults", "- ")):
+            assert above.strip().startswith("# "), line
             assert "Source: " in above, line
             assert any(word in above for word in ("Typical ", "Range ", "One of ")), line
 
@@ -143,12 +163,26 @@ def test_a_lens_stands_before_every_simulator():
         assert instantiate(simulator).lens == Lens(blur_px=1)
 
 
+def test_eventgan_learns_from_another_sensor_or_from_that_of_the_data():
+    foreign, own = (
+        instantiate(composed(f"sim={each}").sim) for each in ("eventgan", "eventgan/own")
+    )
+    names = [each.network.teacher.name for each in (foreign, own)]
+    assert names == ["dsec_mini_foreign", "dsec_mini"]
+    sensors = {each.network.teacher.sensor_hash for each in (foreign, own)}
+    assert len(sensors) == 2
+    assert (foreign.caveat("dsec_mini"), bool(own.caveat("dsec_mini"))) == ("", True)
+    on_files = composed("sim=eventgan/own", "data=dsec", "data.root=somewhere")
+    assert instantiate(on_files.sim).network.teacher.name == "dsec"
+
+
 def test_every_simulator_has_a_parameter_file():
     assert {path.stem for path in (CONFIGS / "sim").glob("*.yaml")} == {
         *SIMULATORS,
         "real",
         "files",
         "mix",
+        "volumes",  # which needs a network of the user's
     }
 
 
@@ -163,7 +197,8 @@ def test_every_setting_changes_its_simulator_wherever_that_stands(setting):
     assert instantiate(elsewhere) == simulator
     text = (CONFIGS / "sim" / f"{setting}.yaml").read_text()
     own = {key: value for key, value in yaml.safe_load(text).items() if key != "defaults"}
-    assert all(getattr(simulator, key) == value for key, value in own.items())
+    plainly = {key: value for key, value in own.items() if key != "network"}
+    assert all(getattr(simulator, key) == value for key, value in plainly.items())
     changed = {key for key in own if getattr(simulator, key) != getattr(plain, key)}
     assert changed
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tiny_networks import contrast_counts, tiny_learning
 
 from eqs.events import Events
 from eqs.frames import Lens, LinearInterpolation
@@ -21,12 +22,15 @@ from eqs.simulators import (
     PECS,
     PIX2NVS,
     V2E,
+    DVSPixel,
     DVSVoltmeter,
+    EventGAN,
     Gazebo,
     ImprovedESIM,
     Prophesee,
     RowReadout,
     Vid2E,
+    VolumeNetwork,
 )
 
 SIMULATORS = [
@@ -60,6 +64,10 @@ SIMULATORS = [
     ADV2E(),
     ADV2E(law="large", second_cutoff_hz=2000.0, voltage_noise_log=0.06, seed=8),
     ADV2E(threshold_sigma_log=0, voltage_noise_log=0, cutoff_hz=30),
+    DVSPixel(seed=9),
+    DVSPixel(threshold_sigma_log=0, noisy=False, photodiode_hz=30),
+    EventGAN(network=tiny_learning(), shortest_us=10_000),
+    VolumeNetwork(network=contrast_counts),
     PECS(time_constant_us=3000.0, light=None, lens=Lens(blur_px=0.0), seed=7),
 ]
 SILENT = [
@@ -87,6 +95,8 @@ SILENT = [
     PECS(background_on_hz=0, background_off_hz=0),
     ADV2E(),
     ADV2E(law="large", second_cutoff_hz=2000.0),
+    VolumeNetwork(network=contrast_counts),
+    DVSPixel(noisy=False, leak_hz=0, leak_hz_at_white=0),
 ]
 MISMATCH_ALONE = {("esim", "fixed"), ("carla", "fixed")}
 FIELDS = ("t", "x", "y", "p")
@@ -200,7 +210,7 @@ def test_the_order_is_time_row_column(simulator, walk):
 def test_events_lie_within_the_clip(simulator, walk):
     frames, times = walk
     events = simulator.simulate(frames, times)
-    delay = {"icns": 10_000, "pecs": 10_000, "adv2e": 22_000}.get(
+    delay = {"icns": 10_000, "pecs": 10_000, "adv2e": 22_000, "dvs_pixel": 24_000}.get(
         simulator.name, 0
     )  # its longest latency
     if simulator.name == "pix2nvs" and simulator.mode == "faithful":
@@ -328,6 +338,8 @@ def test_a_stream_without_frames_cannot_finish():
         (ICNS, {"white_lux": 0}),
         (PECS, {"mode": "faithful"}),
         (ADV2E, {"law": "linear"}),
+        (DVSPixel, {"mode": "faithful"}),
+        (DVSPixel, {"photodiode_hz": 0}),
         (ADV2E, {"cutoff_hz": 0}),
         (ADV2E, {"voltage_noise_log": -1}),
         (ICNS, {"background_on_hz": -1}),

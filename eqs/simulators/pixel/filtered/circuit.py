@@ -19,9 +19,8 @@ from eqs.simulators.pixel.light_dependent import (
 
 SEEING = -math.inf
 """The end of the blindness of a pixel that is not blind."""
-# The pole behind takes the photoreceptor's way for a line, so a photoreceptor that lags behind the
-# light is followed in finer steps.
-_LAG_WEIGHT = 4.0
+_TRANSIENT_LOG = 0.01  # below it a transient is over
+_TRANSIENT_STEP = 0.25  # time constants; a line then is right to a hundredth of the transient
 
 
 class Seen(NamedTuple):
@@ -107,12 +106,24 @@ class Comparator(NamedTuple):
 
 
 @njit(cache=True)
-def steps_of(received: float, ramp: Ramp, span_us: float, circuit: Circuit) -> int:
-    """How many sub-steps a pixel takes through an interval."""
-    change = abs(ramp.slope * span_us)
+def step_of(pixel: Pixel, ramp: Ramp, longest_us: float, left_us: float, circuit: Circuit) -> float:
+    """Length of the next sub-step, the last of which ends with the interval.
+
+    Args:
+        pixel: when it begins.
+        ramp: what is left of the interval's.
+        longest_us: in which the light changes little enough.
+        left_us: of the interval.
+        circuit: its filters.
+    """
+    # A pole behind takes the photoreceptor's way for a line, so its transients go in finer steps.
     if circuit.pole_us > 0.0:
-        change = max(change, _LAG_WEIGHT * abs(received - ramp.start))
-    return sub_steps(change)
+        above = pixel.received - ramp.start
+        if abs(above + ramp.slope * ramp.tau_us) > _TRANSIENT_LOG:
+            quick = circuit.large and above > 0.0  # what is too bright falls at its own rate
+            tau_us = ramp.tau_us * (math.exp(-above) if quick else 1.0)
+            longest_us = min(longest_us, _TRANSIENT_STEP * tau_us)
+    return left_us if left_us < 1.5 * longest_us else longest_us
 
 
 @njit(cache=True)
@@ -166,11 +177,12 @@ def cannot_fire(pixel: Pixel, ramp: Ramp, span_us: float, comparator: Comparator
 @njit(cache=True)
 def settled(pixel: Pixel, ramp: Ramp, span_us: float, circuit: Circuit) -> Pixel:
     """A pixel that fires nothing, at the end of a span."""
-    steps = steps_of(pixel.received, ramp, span_us, circuit)
-    step_us = span_us / steps
-    shrink = shrinkage(ramp.slope, step_us)
-    for _ in range(steps):
+    longest_us, left_us = span_us / sub_steps(ramp.slope * span_us), span_us
+    while left_us > 0.0:
+        step_us = step_of(pixel, ramp, longest_us, left_us, circuit)
+        shrink = shrinkage(ramp.slope, step_us)
         way, reached = sub_step(pixel, ramp, shrink, step_us, circuit)
         pixel = moved(pixel, way, reached, ramp.leak, step_us, circuit)
         ramp = rest_of(ramp, shrink, step_us)
+        left_us -= step_us
     return Pixel(pixel.received, pixel.filtered, pixel.memory, SEEING, pixel.last_us)

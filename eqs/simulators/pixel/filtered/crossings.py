@@ -16,10 +16,10 @@ from eqs.simulators.pixel.filtered.circuit import (
     cannot_fire,
     moved,
     rest_of,
-    steps_of,
+    step_of,
     sub_step,
 )
-from eqs.simulators.pixel.light_dependent import Approach, shrinkage
+from eqs.simulators.pixel.light_dependent import Approach, shrinkage, sub_steps
 from eqs.simulators.pixel.ramp_response import first_crossing, response
 from eqs.simulators.pixel.randomness import word_at, ziggurat_normal
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
@@ -120,18 +120,20 @@ def fire_signal(
     """Events within an interval of the pixel number `index`, and that pixel at the end of it."""
     start_us, stop_us = span
     draws = key, fired[1]  # of this pixel's events, whatever others fire
-    steps = steps_of(pixel.received, ramp, stop_us - start_us, circuit)
-    step_us = (stop_us - start_us) / steps
+    left_us = stop_us - start_us
+    longest_us = left_us / sub_steps(ramp.slope * left_us)
     # No event may come before the interval.
     pixel = Pixel(
         pixel.received, pixel.filtered, pixel.memory, pixel.ready_us, max(pixel.last_us, start_us)
     )
-    shrink = shrinkage(ramp.slope, step_us)
-    for number in range(steps):
+    while left_us > 0.0:
+        step_us = step_of(pixel, ramp, longest_us, left_us, circuit)
+        shrink = shrinkage(ramp.slope, step_us)
         way, reached = sub_step(pixel, ramp, shrink, step_us, circuit)
         if pixel.ready_us != SEEING or not cannot_fire(pixel, ramp, step_us, comparator):
-            step = start_us + number * step_us, step_us
+            step = stop_us - left_us, step_us
             pixel, fired = _fire_step(way, pixel, comparator, circuit, step, draws, index, fired)
         pixel = moved(pixel, way, reached, ramp.leak, step_us, circuit)
         ramp = rest_of(ramp, shrink, step_us)
+        left_us -= step_us
     return pixel, fired
