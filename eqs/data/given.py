@@ -100,6 +100,11 @@ class GivenStreams:
         """None is known of a program that did not run here."""
         return ""
 
+    @property
+    def setting(self) -> str:
+        """Nor what it saw."""
+        return ""
+
     @cached_property
     def label(self) -> str:
         """Name and a hash of what the files hold, hidden ones left out."""

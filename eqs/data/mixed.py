@@ -100,6 +100,11 @@ class MixedEvents:
         return ""
 
     @property
+    def setting(self) -> str:
+        """Its name says what it is made of."""
+        return ""
+
+    @property
     def label(self) -> str:
         """Name and a hash of streams and shares, and of the seed where it chooses recordings."""
         mixed = {name: share for name, share in self.shares.items() if share}

@@ -16,7 +16,7 @@ from eqs.content import content_hash
 from eqs.data.recording import Recording
 from eqs.events.writer import EventWriter
 from eqs.files import one_at_a_time, read_json, short_hash, write_json
-from eqs.frames import WHITE
+from eqs.frames import WHITE, LightOfScenes
 from eqs.processors import available_cores, side_by_side
 from eqs.simulators import Simulator
 
@@ -36,6 +36,10 @@ class EventSource(Protocol):
     def caveat(self) -> str:
         """Why it is no stream of a simulator like others; empty where it is one."""
 
+    @property
+    def setting(self) -> str:
+        """What its simulator sees of frames, in words; empty where there is nothing to say."""
+
     def prepare(self, recordings: Sequence[Recording]) -> None:
         """Make every file that `path` will name."""
 
@@ -50,6 +54,7 @@ class RecordedEvents:
     name: str = "real"
     label: str = "real"
     caveat: str = ""
+    setting: str = ""
 
     def prepare(self, recordings: Sequence[Recording]) -> None:
         """Nothing to make: the files came with the recordings."""
@@ -81,6 +86,11 @@ class SimulatedEvents:
     def name(self) -> str:
         """The simulator's name."""
         return self.simulator.name
+
+    @property
+    def setting(self) -> str:
+        """What its simulator sees of frames, in words."""
+        return self.simulator.setting
 
     @property
     def label(self) -> str:
@@ -122,7 +132,10 @@ class SimulatedEvents:
     def simulate(self, recording: Recording) -> None:
         """Write one recording's events and the manifest that says what they are."""
         path = self.path(recording)
-        _, events = write_stream(self.simulator, recording.name, recording.frames(), path)
+        light, clip = self.simulator.light, recording.frames()
+        if isinstance(light, LightOfScenes):
+            clip = light.clip(recording.folder, recording.frame_times_us)
+        _, events = write_stream(self.simulator, recording.name, clip, path)
         write_json(
             self._manifest_path(recording),
             {

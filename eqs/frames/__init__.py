@@ -11,7 +11,7 @@ from eqs.frames.interpolation import (
     NetworkInterpolation,
 )
 from eqs.frames.lens import Lens
-from eqs.frames.light import Light
+from eqs.frames.light import Light, LightOfScenes, LightSource
 from eqs.frames.luma import GreyImage, luma
 from eqs.frames.order import by_name
 from eqs.frames.remapping import View, remapped
@@ -27,6 +27,8 @@ __all__ = [
     "Interpolation",
     "Lens",
     "Light",
+    "LightOfScenes",
+    "LightSource",
     "LinearInterpolation",
     "NetworkInterpolation",
     "VideoFile",

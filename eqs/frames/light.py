@@ -6,9 +6,10 @@ Han et al., "Physical-Based Event Camera Simulator", ECCV 2024, for what a photo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,34 @@ CURVES: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
 }
 
 
+class LightSource(Protocol):
+    """Gives simulators the light of a frame."""
+
+    @property
+    def curve(self) -> str:
+        """What it is called."""
+
+    @property
+    def caveat(self) -> str:
+        """Why who sees it is no simulator like others; empty where it is one."""
+
+    def parameters(self) -> dict[str, Any]:
+        """Everything that changes the events, as plain values."""
+
+    def image(self, frame: NDArray[Any], rounded_luma: bool = True) -> GreyImage:
+        """The light of a checked frame."""
+
+
+@runtime_checkable
+class LightOfScenes(Protocol):
+    """Light that comes with a recording instead of from its frames."""
+
+    def clip(
+        self, folder: Path, frame_times_us: NDArray[np.int64]
+    ) -> Iterator[tuple[NDArray[np.float32], NDArray[np.int64]]]:
+        """Frames to simulate a recording from, and their times, in chunks."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Light:
     """Undoes the curve that a frame camera put its levels on, before a simulator sees them.
@@ -64,6 +93,8 @@ class Light:
     Raises:
         ValueError: the curve or the weights are none of these, or nothing is brighter than black.
     """
+
+    caveat: ClassVar[str] = ""
 
     curve: str = "srgb"
     black_level: float = 0.0

@@ -133,22 +133,36 @@ def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
     return rows
 
 
-def short_names(systems: Sequence[tuple[str, str]], marked: Collection[str] = ()) -> dict[str, str]:
-    """What to call each system: its simulator's name, or its label where settings compete.
+def short_names(
+    systems: Sequence[tuple[str, str]],
+    settings: Mapping[str, str] | None = None,
+    marked: Collection[str] = (),
+) -> dict[str, str]:
+    """What to call each system: its simulator's name, with its setting or label where several are.
 
     Args:
         systems: name of the simulator and label of the stream.
+        settings: what a simulator sees of frames, by label.
         marked: labels of those that are no simulators like others, whose names end in a mark.
     """
-    settings = Counter(name for name, _ in set(systems))
-    names = {label: name if settings[name] == 1 else label for name, label in systems}
-    return {label: name + MARK * (label in marked) for label, name in names.items()}
+    named = [(label, name) for name, label in set(systems)]
+    said = {label: f"{name} {(settings or {}).get(label, '')}".strip() for label, name in named}
+    by_name, by_setting = Counter(name for _, name in named), Counter(said.values())
+    names = {}
+    for name, label in systems:
+        shortest = said[label] if by_setting[said[label]] == 1 else label
+        names[label] = (name if by_name[name] == 1 else shortest) + MARK * (label in marked)
+    return names
 
 
 def run_names(runs: Sequence[Run]) -> dict[str, str]:
     """What to call the system of each run."""
-    marked = {run.result.system for run in runs if run.result.caveat}
-    return short_names([(run.result.simulator, run.result.system) for run in runs], marked)
+    results = [run.result for run in runs]
+    return short_names(
+        [(each.simulator, each.system) for each in results],
+        {each.system: each.setting for each in results},
+        {each.system for each in results if each.caveat},
+    )
 
 
 def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console) -> None:
@@ -221,6 +235,9 @@ def scored_systems(cfg: DictConfig, runs: Sequence[Run]) -> Mapping[str, EventSo
         raise ValueError("Expected simulators to score, got a mix; take sim=mix out of simulators")
     trained = [event_source(run.config().sim, cfg) for run in runs if run.result.plain]
     sources = {s.label: s for s in [*configured, *trained] if s.name != "real"}
-    marked = {label for label, source in sources.items() if source.caveat}
-    names = short_names([(source.name, label) for label, source in sources.items()], marked)
+    names = short_names(
+        [(source.name, label) for label, source in sources.items()],
+        {label: source.setting for label, source in sources.items()},
+        {label for label, source in sources.items() if source.caveat},
+    )
     return {names[label]: source for label, source in sources.items()}

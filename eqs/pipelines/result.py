@@ -31,6 +31,7 @@ class RunResult:
         stages: what the detector was trained on, one after the other; more than one where it
             started from the weights of another run.
         caveat: why its simulator is none like others; empty where it is one.
+        setting: what its simulator saw of frames, in words.
     """
 
     simulator: str
@@ -44,6 +45,7 @@ class RunResult:
     seconds: float
     stages: tuple[Stage, ...]
     caveat: str = ""
+    setting: str = ""
 
     @property
     def plain(self) -> bool:
@@ -85,7 +87,8 @@ class RunResult:
         try:
             own, real = (Accuracy(**record[stream]) for stream in ("own", "real"))
             record.setdefault("stages", [{record["simulator"]: 1.0}])  # before there were others
-            record.setdefault("caveat", "")
+            for name in ("caveat", "setting"):
+                record.setdefault(name, "")
             kept = {field.name: record[field.name] for field in fields(cls)}
         except (KeyError, TypeError) as error:
             raise ValueError(

@@ -176,6 +176,7 @@ def finish(
         RunResult(
             **trained_as(job.source, job.start),
             caveat=job.source.caveat,
+            setting=job.source.setting,
             seed=job.cfg.seed,
             recipe=recipe_hash(job.cfg),
             data=job.identity["data"],

@@ -3,6 +3,7 @@
 from eqs.scenes.camera import Exposure, FrameCamera
 from eqs.scenes.generate import DSECMini, SequencePlan
 from eqs.scenes.labels import TRACK_DTYPE, LabelRule
+from eqs.scenes.scene_light import SceneLight
 from eqs.scenes.sensor import ReferenceSensor, ReferenceStream
 from eqs.scenes.world import ActorsInView, DrivingWorld
 
@@ -16,5 +17,6 @@ __all__ = [
     "LabelRule",
     "ReferenceSensor",
     "ReferenceStream",
+    "SceneLight",
     "SequencePlan",
 ]

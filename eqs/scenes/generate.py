@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from eqs.events.writer import EventWriter
 from eqs.files import PARTIAL, one_at_a_time, read_json, write_json
 from eqs.processors import available_cores, side_by_side
-from eqs.scenes.camera import FrameCamera
+from eqs.scenes.camera import Exposure, FrameCamera
 from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.world import DrivingWorld
@@ -85,6 +86,39 @@ class SequencePlan:
         """What the files depend on, to recognise them again."""
         return {**asdict(self), "version": VERSION}
 
+    @classmethod
+    def of(cls, description: Mapping[str, Any]) -> SequencePlan:
+        """The plan that a description of this version was made of."""
+        values = {name: value for name, value in description.items() if name != "version"}
+        parts = {"sensor": ReferenceSensor, "camera": FrameCamera, "rule": LabelRule}
+        return cls(**values | {name: kind(**values[name]) for name, kind in parts.items()})
+
+    @property
+    def duration_us(self) -> int:
+        """How long the event camera watches."""
+        return LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
+
+    @property
+    def frame_times_us(self) -> NDArray[np.int64]:
+        """When frames are taken, from when the event camera was switched on."""
+        return LEAD_IN_US + FRAME_PERIOD_US * np.arange(self.frames, dtype=np.int64)
+
+    def world(self) -> DrivingWorld:
+        """What both cameras see."""
+        return DrivingWorld(
+            height=self.height,
+            width=self.width,
+            seed=(*self.key, 0),
+            night=self.night,
+            still=self.still,
+            duration_s=1e-6 * self.duration_us,
+        )
+
+    def exposure(self, world: DrivingWorld) -> Exposure:
+        """What the frame camera chooses for the recording, by the light in its middle."""
+        middle = self.frame_times_us[self.frames // 2]
+        return self.camera.meter(world.radiance(float(middle)))
+
     def write(self, root: Path) -> dict[str, Any]:
         """Render into `root/split/name`, which appears when it is complete.
 
@@ -117,16 +151,7 @@ class SequencePlan:
         return record
 
     def _render(self, folder: Path) -> dict[str, Any]:
-        duration_us = LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
-        world = DrivingWorld(
-            height=self.height,
-            width=self.width,
-            seed=(*self.key, 0),
-            night=self.night,
-            still=self.still,
-            duration_s=1e-6 * duration_us,
-        )
-        times = LEAD_IN_US + FRAME_PERIOD_US * np.arange(self.frames, dtype=np.int64)
+        world, times, duration_us = self.world(), self.frame_times_us, self.duration_us
         exposure_us = self._write_frames(folder, world, times)
         boxes = [self.rule.boxes(world.view(int(t)), int(t) + self.t_offset_us) for t in times]
         (folder / "object_detections/left").mkdir(parents=True)
@@ -149,7 +174,7 @@ class SequencePlan:
     def _write_frames(self, folder: Path, world: DrivingWorld, times: np.ndarray) -> int:
         pictures = folder / "images/left/distorted"
         pictures.mkdir(parents=True)
-        exposure = self.camera.meter(world.radiance(float(times[len(times) // 2])))
+        exposure = self.exposure(world)
         for k, t in enumerate(times):
             frame = self.camera.expose(world.radiance, int(t), exposure, (*self.key, 2, k))
             Image.fromarray(frame).save(pictures / f"{k:06d}.png")

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from eqs.frames import GreyImage, Light
+from eqs.frames import GreyImage, Light, LightSource
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.pixel.filtered import Circuit, FilteredPixels, Seen
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
@@ -77,7 +77,7 @@ class ADV2E(Simulator):
     refractory_us: float = 500.0
     voltage_noise_log: float = 0.01
     seed: int = 0
-    light: Light | None = LINEAR
+    light: LightSource | None = LINEAR
 
     def __post_init__(self) -> None:
         """Check the parameters."""

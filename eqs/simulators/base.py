@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import GreyImage, Interpolation, Lens, Light
+from eqs.frames import GreyImage, Interpolation, Lens, LightSource
 from eqs.simulators.streaming.pixels import Pixels
 from eqs.simulators.streaming.readout import Readout
 from eqs.simulators.streaming.stream import Stream
@@ -57,7 +57,7 @@ class Simulator:
     mode: str = "fixed"
     interpolation: Interpolation | None = None
     readout: Readout | None = None
-    light: Light | None = None
+    light: LightSource | None = None
     lens: Lens | None = None
 
     def __post_init__(self) -> None:
@@ -83,7 +83,15 @@ class Simulator:
         Args:
             judge: name of the data set.
         """
-        return ""
+        return "" if self.light is None else self.light.caveat
+
+    @property
+    def setting(self) -> str:
+        """What it sees of frames, in words: light, and frames in between."""
+        words = ["display" if self.light is None else self.light.curve]
+        if self.interpolation is not None:
+            words.append(str(self.interpolation.parameters().get("kind", "interpolated")))
+        return " ".join(words)
 
     def begin(self, image: GreyImage, sequence: str) -> Pixels:
         """The pixels after the first frame of a sequence."""

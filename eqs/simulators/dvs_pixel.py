@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from eqs.frames import GreyImage, Light
+from eqs.frames import GreyImage, Light, LightSource
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.pixel.filtered import Circuit, FilteredPixels, Seen
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
@@ -82,7 +82,7 @@ class DVSPixel(Simulator):
     leak_hz_at_white: float = 0.2
     refractory_us: float = 500.0
     seed: int = 0
-    light: Light | None = LINEAR
+    light: LightSource | None = LINEAR
 
     def __post_init__(self) -> None:
         """Check the parameters."""
@@ -102,7 +102,8 @@ class DVSPixel(Simulator):
 
     def caveat(self, judge: str) -> str:
         """The reference sensor of the rendered street is nearly the same circuit."""
-        return "of the same family as the sensor that judges it" if judge in RELATED else ""
+        family = "of the same family as the sensor that judges it" * (judge in RELATED)
+        return family or super().caveat(judge)
 
     def circuit(self) -> Circuit:
         """What its pixels share."""

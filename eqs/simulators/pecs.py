@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from eqs.frames import Light
+from eqs.frames import Light, LightSource
 from eqs.simulators.icns import ICNS, ICNSPixels
 
 PHOTODIODE = Light(weights="photodiode")
@@ -57,4 +57,4 @@ class PECS(ICNS):
     background_off_hz: float = 0.1
     background_spread_decades: float = 1.0
     white_lux: float = 255.0
-    light: Light | None = PHOTODIODE
+    light: LightSource | None = PHOTODIODE

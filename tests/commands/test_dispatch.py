@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.parametrize("verb", [*CONFIGURED, *PLAIN])
 def test_every_verb_has_a_script_of_its_own(verb, monkeypatch, capsys):
     script = ROOT / f"{verb}.py"
-    script = script if script.exists() else ROOT / "scripts" / f"{verb}.py"
+    script = script if script.exists() else ROOT / "scripts" / f"{verb.replace('-', '_')}.py"
     monkeypatch.setattr("sys.argv", [str(script), "--help"])
     with suppress(SystemExit):  # argparse ends this way
         runpy.run_path(str(script), run_name="__main__")
@@ -74,7 +74,7 @@ def test_the_pipeline_sees_what_was_typed(monkeypatch, tmp_path):
     [
         (["train", "epochs=3"], "got epochs; set recipe.epochs"),
         (["train", "threshold_on_log=0.3"], "got threshold_on_log; set sim.threshold_on_log"),
-        (["train", "preset=paper"], "got preset; set sim=v2e/paper"),
+        (["train", "preset=paper"], "got preset; set sim=pecs/paper, sim=v2e/paper"),
         (["train", "sim=v2e/papre"], "Could not find 'sim/v2e/papre'"),
         (
             ["evaluate", "threshold_on_log=0.3"],

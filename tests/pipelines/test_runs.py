@@ -97,6 +97,15 @@ def test_settings_of_one_simulator_keep_their_labels() -> None:
     assert names == {"esim-1": "esim", "v2e-1": "v2e-1", "v2e-2": "v2e-2"}
 
 
+def test_settings_are_told_by_what_they_see_where_that_differs() -> None:
+    systems = [("esim", "esim-1"), ("v2e", "v2e-1"), ("v2e", "v2e-2"), ("v2e", "v2e-3")]
+    settings = {"esim-1": "display", "v2e-1": "srgb", "v2e-2": "display", "v2e-3": "display"}
+    names = short_names(systems, settings, marked={"esim-1", "v2e-2"})
+    assert names == {
+        "esim-1": "esim†", "v2e-1": "v2e srgb", "v2e-2": "v2e-2†", "v2e-3": "v2e-3"
+    }  # fmt: skip
+
+
 def test_a_resumed_phase_adds_to_its_time(tmp_path: Path) -> None:
     times = PhaseTimes(tmp_path / "timings")
     (tmp_path / "timings").mkdir()

@@ -27,7 +27,7 @@ ROOMS = {
     "simulators.streaming simulators.learned",
     "eqs.simulators.learned": "files frames models simulators simulators.pixel "
     "simulators.streaming",
-    "eqs.scenes": "events files processors",
+    "eqs.scenes": "events files frames processors",
     "eqs.data": "content events files frames processors simulators",
     "eqs.models": "",
     "eqs.metrics.baselines": "events metrics",
@@ -37,7 +37,8 @@ ROOMS = {
     "eqs.study": "drawing files names",
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
     "models names processors simulators simulators.learned study training",
-    "eqs.benchmarks": "data events frames metrics models representations simulators training",
+    "eqs.benchmarks": "data events frames metrics models representations simulators "
+    "simulators.learned training",
     "eqs.commands": "benchmarks data drawing events extras files pipelines",
     "eqs.__main__": "commands",
 }

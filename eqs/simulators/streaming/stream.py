@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
-from eqs.frames import WHITE, GreyImage, Interpolation, Lens, Light, checked_frames, checked_times
+from eqs.frames import (
+    WHITE,
+    GreyImage,
+    Interpolation,
+    Lens,
+    LightSource,
+    checked_frames,
+    checked_times,
+)
 from eqs.processors import useful_bands
 from eqs.simulators.streaming.bands import BandedPixels
 from eqs.simulators.streaming.keys import MAX_PIXELS, MAX_TIME_US, ReorderBuffer, events_of, ordered
@@ -32,7 +40,7 @@ class Model(Protocol):
     def readout(self) -> Readout | None: ...  # noqa: D102
 
     @property
-    def light(self) -> Light | None: ...  # noqa: D102
+    def light(self) -> LightSource | None: ...  # noqa: D102
 
     @property
     def lens(self) -> Lens | None: ...  # noqa: D102
