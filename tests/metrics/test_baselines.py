@@ -22,7 +22,10 @@ from eqs.metrics.baselines import (
 from eqs.metrics.definition import Definition
 
 FRAMES = np.arange(0, 1_000_001, 50_000)
-BEST = {"rate_map_correlation": 1.0, "voxel_ssim": 1.0, "raw_cosine": 1.0, "voxel_psnr": math.inf}
+BEST = {
+    "rate_map_correlation": 1.0, "voxel_ssim": 1.0, "raw_cosine": 1.0, "voxel_psnr": math.inf,
+    "count_cosine": 1.0,
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -113,6 +116,13 @@ def test_tensor_baselines_by_hand():
     assert found["voxel_ssim"] < 0.01
     half = torch.stack([0.5 * full, full], dim=1)
     assert tensor_baselines([half], 10)["raw_cosine"] == pytest.approx(1)
+    assert tensor_baselines([half], 10)["count_cosine"] == pytest.approx(1)
+    assert found["count_cosine"] == 0
+    left = full.clone()
+    left[..., 12:] = 0  # half of what is there
+    parts = torch.stack([left, full], dim=1)
+    one, several = tensor_baselines([parts], 10), tensor_baselines([parts[:1], parts[1:]], 10)
+    assert one["count_cosine"] == several["count_cosine"] == pytest.approx(math.sqrt(0.5))
     assert tensor_baselines([half], 10)["voxel_psnr"] == pytest.approx(20 * math.log10(2))
 
 
