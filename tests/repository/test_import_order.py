@@ -34,7 +34,7 @@ ROOMS = {
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
     "models names processors simulators study training",
     "eqs.benchmarks": "data events frames metrics models representations simulators training",
-    "eqs.commands": "benchmarks data drawing events extras files pipelines",
+    "eqs.commands": "benchmarks data drawing events extras files frames.networks pipelines",
     "eqs.__main__": "commands",
 }
 # The published models: each builds on the simulator, its parts and the stream, and on no other.

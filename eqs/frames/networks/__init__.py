@@ -4,7 +4,8 @@ Importing this room imports torch, so whoever may do without a network imports i
 for.
 """
 
+from eqs.frames.networks.fetching import Published, downloaded, fetch
 from eqs.frames.networks.loading import network_of
 from eqs.frames.networks.planes import Between
 
-__all__ = ["Between", "network_of"]
+__all__ = ["Between", "Published", "downloaded", "fetch", "network_of"]
