@@ -1,4 +1,4 @@
-"""Time simulators, score, detector, event files, or reading for a training, on this machine."""
+"""Time simulators, score, detector, event files, interpolation, or reading for a training."""
 
 from eqs.commands import run
 

@@ -17,7 +17,8 @@ PLAIN = {
     "convert": "Convert an event file of any kind, with its frames, to the layout of DSEC.",
     "view": "Show an event file as a GIF, an MP4 or a strip of stills.",
     "watch": "Film what a trained detector finds.",
-    "benchmark": "Time simulators, score, detector, or reading for a training, on this machine.",
+    "benchmark": "Time simulators, score, detector, interpolation, or reading for a training.",
+    "fetch-interpolator": "Fetch the weights of a network that makes frames in between.",
     "compare": "Compare trainings: accuracy over wall time, and how their settings differ.",
 }
 HELP = ("-h", "--help")
@@ -58,7 +59,7 @@ def _run(verb: str, arguments: Sequence[str], shown: str) -> None:
     if verb in PLAIN:
         try:
             with needed("all", f"for eqs {verb}"):
-                command = import_module(f"eqs.commands.{verb}")
+                command = import_module(f"eqs.commands.{verb.replace('-', '_')}")
         except ValueError as error:
             sys.exit(str(error))
         command.main(arguments, shown)
@@ -71,7 +72,8 @@ def _run(verb: str, arguments: Sequence[str], shown: str) -> None:
 def overview() -> str:
     """What `eqs` alone prints."""
     verbs = {verb: purpose(command.config) for verb, command in CONFIGURED.items()} | PLAIN
-    lines = [f"  {verb:<17}{text}" for verb, text in verbs.items()]
+    width = max(map(len, verbs)) + 2
+    lines = [f"  {verb:<{width}}{text}" for verb, text in verbs.items()]
     return "\n".join(
         [
             "How real is simulated event-camera data, and does it matter to a detector?",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from eqs.files import complete_file, file_sha256
 
 Frame = NDArray[Any]
+LOADER = 1  # raise it whenever the same file of a network gives other frames
 
 
 class Interpolation(Protocol):
@@ -62,47 +63,53 @@ class LinearInterpolation:
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkInterpolation:
-    """A network of the user's, for instance Super SloMo, FILM or RIFE.
+    """A network: one in a file, as FILM, Super SloMo and RIFE are published, or one of the user's.
 
     Args:
         network: takes two frames as float arrays (H, W) or (H, W, 3), levels 0 to 255, and the
             share of the way from the first to the second, and gives the frame there; or the path
-            of a TorchScript file that takes tensors (1, C, H, W), levels 0 to 1, and the share.
+            of a file: TorchScript, a Super SloMo checkpoint or the weights of RIFE 4.25.
         factor: frames out per frame in.
         name: what tells this network from others, where it is no file.
+        made_by: the command that makes the file, for those who lack it.
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: the factor is not a whole number from 1 up.
+        ValueError: the factor is not a whole number from 1 up; or, when frames are made, the file
+            holds something else.
     """
 
     network: Callable[[Frame, Frame, float], Frame] | str | Path
     factor: int = 10
     name: str = "network"
+    made_by: str | None = None
 
     def __post_init__(self) -> None:
         """Check the factor and the file."""
         require_factor(self.factor)
         if isinstance(self.network, str | Path) and not Path(self.network).is_file():
+            remedy = "set interpolation.inner.network"
             raise FileNotFoundError(
-                f"Expected a TorchScript file at {self.network}, found none; "
-                "set interpolation.network"
+                f"Expected a network's file at {self.network}, found none; "
+                f"{f'type {self.made_by}, or {remedy}' if self.made_by else remedy}"
             )
 
     def between(self, first: Frame, second: Frame) -> Frame:
         """See `Interpolation`."""
-        network = self.network
-        if isinstance(network, str | Path):
-            network = scripted(Path(network))
+        network, at = self.network, shares(self.factor)
         pair = first.astype(np.float32), second.astype(np.float32)
-        return stacked(first, [network(*pair, share) for share in shares(self.factor)])
+        if isinstance(network, str | Path):
+            made = frames_by_file(Path(network))(*pair, at)
+        else:
+            made = [network(*pair, share) for share in at]
+        return stacked(first, made)
 
     def parameters(self) -> dict[str, Any]:
         """See `Interpolation`."""
-        identity = self.name
+        known: dict[str, Any] = {"kind": "network", "factor": self.factor, "name": self.name}
         if isinstance(self.network, str | Path):
-            identity = network_sha256(Path(self.network))
-        return {"kind": "network", "factor": self.factor, "name": identity}
+            known |= {"name": network_sha256(Path(self.network)), "loader": LOADER}
+        return known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,8 +174,8 @@ def network_sha256(path: Path) -> str:
     return _sha256(path, *_times(path))
 
 
-def scripted(path: Path) -> Callable[[Frame, Frame, float], Frame]:
-    """A TorchScript file as a function of frames, loaded once."""
+def frames_by_file(path: Path) -> Callable[[Frame, Frame, Sequence[float]], list[Frame]]:
+    """The network of a file as a function of frames and shares, loaded once."""
     return _loaded(path, *_times(path))
 
 
@@ -184,21 +191,10 @@ def _sha256(path: Path, *_: int) -> str:
 
 
 @lru_cache(maxsize=2)
-def _loaded(path: Path, *_: int) -> Callable[[Frame, Frame, float], Frame]:
-    import torch  # only those who bring a network need it here
+def _loaded(path: Path, *_: int) -> Callable[[Frame, Frame, Sequence[float]], list[Frame]]:
+    from eqs.frames.networks import network_of  # torch: only those who bring a network need it here
 
-    network = torch.jit.load(str(path), map_location="cpu").eval()
-
-    def tensor(frame: Frame) -> torch.Tensor:
-        channels = frame[None] if frame.ndim == 2 else np.moveaxis(frame, -1, 0)
-        return torch.from_numpy(np.ascontiguousarray(channels))[None] / 255.0
-
-    @torch.inference_mode()
-    def between(first: Frame, second: Frame, share: float) -> Frame:
-        made = 255.0 * network(tensor(first), tensor(second), share)[0].numpy()
-        return made[0] if first.ndim == 2 else np.moveaxis(made, 0, -1)
-
-    return between
+    return network_of(path)
 
 
 def displacement_factor(largest_px: float, largest_step_px: float, most: int) -> int:

@@ -18,8 +18,8 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.parametrize("verb", [*CONFIGURED, *PLAIN])
 def test_every_verb_has_a_script_of_its_own(verb, monkeypatch, capsys):
-    script = ROOT / f"{verb}.py"
-    script = script if script.exists() else ROOT / "scripts" / f"{verb.replace('-', '_')}.py"
+    name = f"{verb.replace('-', '_')}.py"
+    script = ROOT / name if (ROOT / name).exists() else ROOT / "scripts" / name
     monkeypatch.setattr("sys.argv", [str(script), "--help"])
     with suppress(SystemExit):  # argparse ends this way
         runpy.run_path(str(script), run_name="__main__")

@@ -1,5 +1,10 @@
 """Frames between the frames: cross-fades, optical flow, networks, and what is kept on disk."""
 
+import hashlib
+import subprocess
+import sys
+import warnings
+
 import numpy as np
 import pytest
 import torch
@@ -82,20 +87,60 @@ class Fade(torch.nn.Module):
         return first * (1.0 - share) + second * share
 
 
-@pytest.mark.filterwarnings("ignore:.*torch.jit:DeprecationWarning")
+@pytest.fixture
+def fade(tmp_path):
+    """A file with a network that cross-fades; its maker hears that TorchScript is deprecated."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.jit.script(Fade()).save(str(tmp_path / "fade.pt"))
+    return tmp_path / "fade.pt"
+
+
 @pytest.mark.parametrize("shape", [(5, 6), (5, 6, 3)])
-def test_a_network_in_a_file(tmp_path, shape):
-    path = tmp_path / "fade.pt"
-    torch.jit.script(Fade()).save(str(path))
+def test_a_network_in_a_file(fade, shape):
     rng = np.random.default_rng(0)
     first, second = rng.integers(0, 256, (2, *shape), dtype=np.uint8)
-    interpolation = NetworkInterpolation(network=path, factor=3)
+    interpolation = NetworkInterpolation(network=fade, factor=3)
     made = interpolation.between(first, second)
     expected = LinearInterpolation(factor=3).between(first, second)
     assert np.abs(made - expected).max() < 1e-3
-    assert len(interpolation.parameters()["name"]) == 64
-    with pytest.raises(FileNotFoundError, match="TorchScript file"):
-        NetworkInterpolation(network=tmp_path / "none.pt")
+    assert NetworkInterpolation(network=fade, factor=1).between(first, second).shape == (0, *shape)
+
+
+def test_a_file_is_known_by_its_content(fade, tmp_path):
+    known = NetworkInterpolation(network=fade).parameters()
+    assert known["name"] == hashlib.sha256(fade.read_bytes()).hexdigest()
+    moved = fade.rename(tmp_path / "other.pt")
+    again = NetworkInterpolation(network=moved, made_by="a command").parameters()
+    assert again == known
+
+
+def test_a_file_that_is_missing_says_which_command_makes_it(tmp_path):
+    gone = tmp_path / "none.pt"
+    with pytest.raises(FileNotFoundError, match=r"none.pt, found none; set interpolation\.inner"):
+        NetworkInterpolation(network=gone)
+    wanted = r"none.pt, found none; type eqs fetch, or set interpolation\.inner\.network"
+    with pytest.raises(FileNotFoundError, match=wanted):
+        NetworkInterpolation(network=gone, made_by="eqs fetch")
+
+
+def test_frames_of_a_file_are_kept_too(fade, tmp_path):
+    inner = NetworkInterpolation(network=fade, factor=3)
+    cached = CachedInterpolation(inner=inner, folder=tmp_path / "kept")
+    made = cached.between(bar(20.0), bar(30.0))
+    np.testing.assert_array_equal(made, inner.between(bar(20.0), bar(30.0)))
+    fade.touch()
+    np.testing.assert_array_equal(cached.between(bar(20.0), bar(30.0)), made)
+    assert len(list((tmp_path / "kept").iterdir())) == 1
+
+
+@pytest.mark.parametrize("kind", ["FlowInterpolation", "LinearInterpolation"])
+def test_whoever_brings_no_network_loads_no_torch(kind):
+    code = (
+        f"import sys, numpy as np, eqs.frames as f; made = f.{kind}(factor=2); "
+        "made.between(np.zeros((8, 8)), np.ones((8, 8))); sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_made_frames_are_kept_by_content(tmp_path):

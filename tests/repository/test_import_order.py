@@ -17,7 +17,8 @@ ROOMS = {
     "eqs.processors": "",
     "eqs.content": "processors",
     "eqs.events": "clock extras files",
-    "eqs.frames": "clock extras files",
+    "eqs.frames.networks": "files",
+    "eqs.frames": "clock extras files frames.networks",
     "eqs.representations": "events",
     "eqs.drawing": "events extras files names",
     "eqs.simulators.streaming": "events frames processors",
@@ -37,9 +38,9 @@ ROOMS = {
     "eqs.study": "drawing files names",
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
     "models names processors simulators simulators.learned study training",
-    "eqs.benchmarks": "data events frames metrics models representations simulators "
+    "eqs.benchmarks": "data events frames metrics models representations scenes simulators "
     "simulators.learned training",
-    "eqs.commands": "benchmarks data drawing events extras files pipelines",
+    "eqs.commands": "benchmarks data drawing events extras files frames.networks pipelines",
     "eqs.__main__": "commands",
 }
 # The published models: each builds on the simulator, its parts and the stream, and on no other.
