@@ -17,7 +17,6 @@ from eqs.frames import GreyImage, Light, LightSource
 from eqs.simulators.base import Simulator, require_not_negative, require_positive
 from eqs.simulators.pixel.filtered import Circuit, FilteredPixels, Seen
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
-from eqs.simulators.pixel.thresholds import Sides, threshold_map
 
 ELECTRON_FC = 1.602176634e-4  # femtocoulomb
 WHITE = 255.0
@@ -113,14 +112,6 @@ class DVSPixel(Simulator):
             pole_us=1 / (2 * math.pi * self.source_follower_hz * MICROSECONDS),
             refractory_us=float(self.refractory_us),
             resets=True,
-        )
-
-    def thresholds(self, image: GreyImage) -> Sides:
-        """Those of the pixels of an image."""
-        sigma, seed = self.threshold_sigma_log, self.seed
-        return Sides(
-            threshold_map(self.threshold_on_log, sigma, seed, "threshold on", image),
-            threshold_map(self.threshold_off_log, sigma, seed, "threshold off", image),
         )
 
     def seen(self, image: GreyImage) -> Seen:

@@ -15,7 +15,7 @@ from eqs.simulators.pixel.crossing import (
     firing_pixels,
 )
 from eqs.simulators.pixel.photoreceptor import Seen
-from eqs.simulators.pixel.thresholds import Sides, threshold_map
+from eqs.simulators.pixel.thresholds import Sides, threshold_maps
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
 
@@ -32,9 +32,7 @@ class ESIMPixels:
         self.signal = model.signal(image.levels)
         self.reference = self.signal[image.codes]
         self.last_us = np.full(pixels if model.refractory_us > 0 else 1, -np.inf)
-        sigma, seed = model.threshold_sigma_log, model.seed
-        self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image)
-        self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image)
+        self.on, self.off = threshold_maps(model, image)
         self.difference = np.empty(pixels)
         self.chosen = np.empty(pixels, np.int32)
         self.passed = np.empty(pixels, np.int64)

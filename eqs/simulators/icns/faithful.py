@@ -14,7 +14,7 @@ from eqs.simulators.icns.latency import SEEING, Delays, latency
 from eqs.simulators.icns.parameters import ICNS
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
 from eqs.simulators.pixel.randomness import draw_key, uniform_map, word_at
-from eqs.simulators.pixel.thresholds import Sides, ThresholdLaw, redraw, threshold_map
+from eqs.simulators.pixel.thresholds import Sides, ThresholdLaw, redraw, threshold_maps
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
 
@@ -31,17 +31,13 @@ class FaithfulICNSPixels:
         self.voltage = model.signal(image.levels)[image.codes]
         self.reset = self.voltage.copy()
         self.tau_us = self._time_constants(self.voltage)
-        self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
-        self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
+        # Copies, as thresholds are drawn anew.
+        self.on, self.off = (side.copy() for side in threshold_maps(model, image))
         self.ready_us = np.full(self.voltage.size, SEEING)
         on_hz, off_hz = model.background_hz(image)
         self.on_us, self.on_period_us = self._background(on_hz, "on")
         self.off_us, self.off_period_us = self._background(off_hz, "off")
         self.keys = np.empty(self.voltage.size, np.int64)
-
-    def _thresholds(self, mean_log: float, name: str, image: GreyImage) -> NDArray[np.float64]:
-        sigma, seed = self.model.threshold_sigma_log, self.model.seed
-        return threshold_map(mean_log, sigma, seed, name, image).copy()
 
     def _time_constants(self, signal: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.model.time_constant_us * 1000.0 * np.exp(-signal)

@@ -20,7 +20,7 @@ from eqs.simulators.pixel.thresholds import (
     Sides,
     ThresholdLaw,
     redraw,
-    threshold_map,
+    threshold_maps,
 )
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
@@ -52,15 +52,11 @@ class ICNSPixels:
         self.seen = self._seen(image)
         self.voltage = self.seen.signal[image.codes]
         self.reset = self.voltage.copy()
-        self.on = self._thresholds(model.threshold_on_log, "threshold on", image)
-        self.off = self._thresholds(model.threshold_off_log, "threshold off", image)
+        # Copies, as thresholds are drawn anew.
+        self.on, self.off = (side.copy() for side in threshold_maps(model, image))
         self.background = model.background_hz(image)
         self.ready_us = np.full(self.voltage.size, SEEING)
         self.keys = np.empty(self.voltage.size, np.int64)
-
-    def _thresholds(self, mean_log: float, name: str, image: GreyImage) -> NDArray[np.float64]:
-        sigma, seed = self.model.threshold_sigma_log, self.model.seed
-        return threshold_map(mean_log, sigma, seed, name, image).copy()
 
     def _seen(self, image: GreyImage) -> SeenLight:
         signal = self.model.signal(image.levels)

@@ -12,7 +12,7 @@ from eqs.simulators.improved_esim.parameters import ImprovedESIM
 from eqs.simulators.pixel.crossing import RELATIVE_TOLERANCE
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
 from eqs.simulators.pixel.randomness import draw_key, uniform_map
-from eqs.simulators.pixel.thresholds import threshold_map
+from eqs.simulators.pixel.thresholds import threshold_maps
 from eqs.simulators.streaming.keys import Fired, event_key, with_room
 from eqs.simulators.streaming.pixels import Interval
 
@@ -23,9 +23,8 @@ class ImprovedESIMPixels:
     def __init__(self, model: ImprovedESIM, image: GreyImage, sequence: str) -> None:
         """Settle on the first image."""
         self.model = model
-        pixels, seed, sigma = image.codes.size, model.seed, model.threshold_sigma_log
-        self.on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image)
-        self.off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image)
+        pixels, seed = image.codes.size, model.seed
+        self.on, self.off = threshold_maps(model, image)
         self.filter = PixelFilter(model, image)
         self.above = np.zeros(pixels)
         first_pixel = image.first_pixel

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -120,8 +121,11 @@ class Learning:
         """Write one network."""
         import torch
 
+        # By way of memory: a file that torch names itself holds that name, and so another hash.
+        content = BytesIO()
+        torch.save(state, content)
         with complete_file(self.weights(fold)) as partial:
-            torch.save(state, partial)
+            partial.write_bytes(content.getvalue())
 
     def finish(self, record: Mapping[str, Any]) -> None:
         """Write, last, what was learned from what: `teacher`, `data`, `folds` and `val`."""

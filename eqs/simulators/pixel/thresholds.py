@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -19,6 +19,22 @@ class Sides(NamedTuple):
 
     on: NDArray[np.float64]
     off: NDArray[np.float64]
+
+
+class Thresholded(Protocol):
+    """A simulator whose pixels differ in their thresholds."""
+
+    @property
+    def threshold_on_log(self) -> float: ...  # noqa: D102
+
+    @property
+    def threshold_off_log(self) -> float: ...  # noqa: D102
+
+    @property
+    def threshold_sigma_log(self) -> float: ...  # noqa: D102
+
+    @property
+    def seed(self) -> int: ...  # noqa: D102
 
 
 class ThresholdLaw(NamedTuple):
@@ -48,6 +64,15 @@ def threshold_map(
     key = draw_key(seed, name, first_pixel=image.first_pixel)
     drawn = mean_log + sigma_log * normal_map(key, pixels)
     return np.maximum(drawn, SMALLEST_THRESHOLD_LOG)
+
+
+def threshold_maps(model: Thresholded, image: GreyImage) -> Sides:
+    """The thresholds of every pixel of an image, ON and OFF, see `threshold_map`."""
+    sigma, seed = model.threshold_sigma_log, model.seed
+    return Sides(
+        threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image),
+        threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image),
+    )
 
 
 @njit(cache=True)

@@ -19,7 +19,7 @@ from eqs.simulators.pixel.randomness import (
     normal_quantile,
     word_at,
 )
-from eqs.simulators.pixel.thresholds import threshold_map
+from eqs.simulators.pixel.thresholds import threshold_maps
 from eqs.simulators.streaming.keys import Fired
 from eqs.simulators.streaming.pixels import Interval
 from eqs.simulators.v2e.parameters import V2E
@@ -34,9 +34,8 @@ class V2EPixels:
         """Settle on the first image."""
         self.model = model
         self.sequence = sequence
-        pixels, seed, sigma = image.codes.size, model.seed, model.threshold_sigma_log
-        on = threshold_map(model.threshold_on_log, sigma, seed, "threshold on", image)
-        off = threshold_map(model.threshold_off_log, sigma, seed, "threshold off", image)
+        pixels = image.codes.size
+        on, off = threshold_maps(model, image)
         self.on, self.off = self._stored(on), self._stored(off)
         self.leak_per_second = self._stored(self._leaks(on))
         signal = lin_log(image.levels, model.knee_level)

@@ -22,7 +22,7 @@ from eqs.simulators.pixel.filtered.circuit import (
 from eqs.simulators.pixel.filtered.crossings import fire_signal
 from eqs.simulators.pixel.filtered.noise_events import fire_noise, may_fire
 from eqs.simulators.pixel.randomness import draw_key, word_at
-from eqs.simulators.pixel.thresholds import Sides
+from eqs.simulators.pixel.thresholds import Sides, Thresholded, threshold_maps
 from eqs.simulators.streaming.keys import Fired
 from eqs.simulators.streaming.pixels import Interval
 
@@ -37,17 +37,11 @@ class State(NamedTuple):
     last_us: NDArray[np.float64]
 
 
-class FilteredModel(Protocol):
+class FilteredModel(Thresholded, Protocol):
     """What the pixels ask of a simulator."""
-
-    @property
-    def seed(self) -> int: ...  # noqa: D102
 
     def circuit(self) -> Circuit:
         """What all pixels share."""
-
-    def thresholds(self, image: GreyImage) -> Sides:
-        """Those of the pixels of an image."""
 
     def seen(self, image: GreyImage) -> Seen:
         """An image as pixels see it."""
@@ -63,7 +57,7 @@ class FilteredPixels:
         light = self.image.light_log[image.codes]
         sees = np.full(light.size, SEEING)
         self.state = State(light, light.copy(), light.copy(), sees, sees.copy())
-        self.thresholds = model.thresholds(image)
+        self.thresholds = threshold_maps(model, image)
         self.keys = np.empty(light.size, np.int64)
 
     def advance(self, image: GreyImage, interval: Interval) -> NDArray[np.int64]:
