@@ -22,7 +22,7 @@ from eqs.pipelines.recipe import data_hash
 from eqs.processors import available_cores, side_by_side
 from eqs.simulators.learned import FOLDS, EventGAN, Learning
 from eqs.training import CompleteCheckpoints
-from eqs.training.frame_pairs import BatchNumbers, FramePairs
+from eqs.training.frame_pairs import BatchNumbers, FramePairs, simplest
 from eqs.training.progress import EpochLines
 from eqs.training.volume_task import VolumeTask
 
@@ -47,8 +47,10 @@ def train_simulator(cfg: DictConfig) -> None:
     learn(learning)
     for fold, found in enumerate(learning.record()["val"]):
         log.info(
-            "network %d: likelihood %.4f on val, %.2f events per real event, cosine %.3f",
-            fold, found["nll"], found["events_per_real_event"], found["cosine"],
+            "network %d: negative log-likelihood %.4f on val (%.4f by one rate, %.4f by one a "
+            "pixel), %.2f events per event, cosine %.3f",
+            fold, found["nll"], found["nll_constant"], found["nll_per_pixel"],
+            found["events_per_real_event"], found["cosine"],
         )  # fmt: skip
     log.info("%s", learning.folder)
 
@@ -136,7 +138,8 @@ def learn_fold(job: Fold) -> tuple[int, dict[str, float]]:
             task, train, val, ckpt_path=last if last.is_file() else None, weights_only=False
         )
         job.learning.keep(job.number, task.generator.state_dict())
-        write_json(done, task.found)
+        learned = FramePairs(job.recordings(teacher_of(job.learning)), augmented=False)
+        write_json(done, {**task.found, **simplest(learned, val.dataset)})  # type: ignore[arg-type]
     return job.number, read_json(done)
 
 

@@ -59,6 +59,11 @@ class FramePairs(Dataset[Pair]):
         seen, later = (torch.from_numpy(np.ascontiguousarray(each)) for each in (first, second))
         return seen, later, torch.from_numpy(counts.astype(np.float32))
 
+    def mean_counts(self) -> NDArray[np.float64]:
+        """Mean counts per pair, shape (20, H, W)."""
+        total = sum(self._counts(int(k), int(i)) for k, i in self.pairs)
+        return np.asarray(total / len(self.pairs), np.float64)
+
     def _counts(self, k: int, i: int) -> NDArray[np.int64]:
         recording = self.recordings[k]
         start_us, stop_us = (int(each) for each in recording.frame_times_us[i : i + 2])
@@ -68,6 +73,26 @@ class FramePairs(Dataset[Pair]):
         flat = (events.p.astype(np.int64) * BINS + bins) * height + events.y
         counted = np.bincount(flat * width + events.x, minlength=2 * BINS * height * width)
         return counted.reshape(2 * BINS, height, width)
+
+
+def simplest(learned: FramePairs, judged: FramePairs) -> dict[str, float]:
+    """Likelihoods of counts by two guesses that do not look at frames, as a network's is measured.
+
+    Args:
+        learned: pairs that the guesses are made of.
+        judged: pairs that they are measured on.
+
+    Returns:
+        `nll_constant` of one rate for all, `nll_per_pixel` of one for each pixel and polarity.
+    """
+    seen, counts = learned.mean_counts(), judged.mean_counts()
+    sides = seen.reshape(2, BINS, *seen.shape[1:]).mean(axis=1, keepdims=True)
+    rates = np.broadcast_to(sides, (2, BINS, *seen.shape[1:])).reshape(seen.shape)
+    # The likelihood is linear in the counts, so their mean over pairs is all that it needs.
+    guesses = {"nll_constant": np.full_like(seen, seen.mean()), "nll_per_pixel": rates}
+    return {
+        name: float((rate - counts * np.log(rate + 1e-6)).mean()) for name, rate in guesses.items()
+    }
 
 
 class BatchNumbers(Sampler[list[tuple[int, int]]]):

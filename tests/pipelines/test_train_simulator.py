@@ -13,8 +13,8 @@ from eqs.frames import luma
 from eqs.pipelines.train_simulator import Fold, ensure_learned, learn, learn_fold
 from eqs.scenes import DSECMini
 from eqs.simulators import ESIM, EventGAN, Learning
-from eqs.training.frame_pairs import BatchNumbers, FramePairs
-from eqs.training.volume_task import VolumeTask
+from eqs.training.frame_pairs import BatchNumbers, FramePairs, simplest
+from eqs.training.volume_task import VolumeTask, negative_log_likelihood
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,9 @@ def test_it_learns_once_and_simulates_each_recording_by_the_network_of_the_other
     assert [len(each) for each in names] == [2, 1]
     assert {model.fold_of(name) for name in names[0]} == {1}
     assert {model.fold_of(name) for name in names[1]} == {0}
-    assert set(record["val"][0]) == {"nll", "events_per_real_event", "cosine"}
+    assert set(record["val"][0]) == {
+        "nll", "events_per_real_event", "cosine", "nll_constant", "nll_per_pixel"
+    }  # fmt: skip
     times = [learning.weights(fold).stat().st_mtime_ns for fold in (0, 1)]
     ensure_learned(model)
     assert [learning.weights(fold).stat().st_mtime_ns for fold in (0, 1)] == times
@@ -123,6 +125,17 @@ def test_pairs_hold_what_was_fired_between_their_frames(school):
     assert counts.sum() == len(window)
     on_late = window.p.astype(bool) & (window.t >= start + (stop - start) * 9 // 10)
     assert counts[19].sum() == on_late.sum()
+
+
+def test_the_simplest_guesses_are_measured_as_a_network_is(school):
+    """On what it was made of, the guess for each pixel and polarity is the better one."""
+    school.prepare()
+    pairs = FramePairs(school.recordings("val"), augmented=False)
+    found = simplest(pairs, pairs)
+    counts = torch.stack([pair[2] for pair in pairs])
+    constant = negative_log_likelihood(counts.mean().expand_as(counts), counts).item()
+    assert found["nll_constant"] == pytest.approx(constant, rel=1e-4)
+    assert found["nll_per_pixel"] < found["nll_constant"]
 
 
 def test_a_pair_in_disguise_keeps_its_contrast_and_its_events(school):
