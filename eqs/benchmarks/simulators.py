@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -22,7 +23,7 @@ from rich.table import Table
 
 from eqs import simulators
 from eqs.benchmarks.timing import Cost, in_own_process, time_runs
-from eqs.frames import FrameFolder, image_paths
+from eqs.frames import FrameFolder, GreyImage, Light, image_paths
 from eqs.models.volumes import VolumeGenerator
 from eqs.simulators.learned import FOLDS
 
@@ -163,4 +164,23 @@ def print_table(
             shown = str(threshold_log) if has_threshold(name) else "its own"
             values = (events / 1e6, *rates, cost.peak_mib)
             table.add_row(name, shown, *(f"{value:.1f}" for value in values))
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    plain, linear = light_milliseconds(draw_clip(2, height, width)[0])
+    console.print(
+        f"an image takes {plain:.3f} ms of a core, of display values, and {linear:.3f} ms with "
+        "light=srgb, medians"
+    )
+
+
+def light_milliseconds(frame: np.ndarray, repeats: int = 51) -> tuple[float, float]:
+    """What a frame costs until pixels see it, as display values and as light, in turn."""
+    seconds: dict[str, list[float]] = {"plain": [], "linear": []}
+    for _ in range(repeats):
+        for name, seen in (("plain", GreyImage.from_frame), ("linear", Light().image)):
+            start = time.process_time()
+            for _ in range(10):
+                seen(frame)
+            seconds[name].append((time.process_time() - start) / 10)
+    plain, linear = (1000 * float(np.median(each)) for each in seconds.values())
+    return plain, linear

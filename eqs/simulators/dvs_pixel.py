@@ -21,7 +21,7 @@ from eqs.simulators.pixel.photoreceptor import MICROSECONDS
 ELECTRON_FC = 1.602176634e-4  # femtocoulomb
 WHITE = 255.0
 LINEAR = Light()
-RELATED = ("dsec_mini", "dsec_mini_foreign")
+RELATED = ("dsec_mini", "dsec_mini_smoke")
 """Data sets whose reference sensor is a circuit of this kind."""
 
 

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from eqs.benchmarks.simulators import PERIOD_US, Job, configured, draw_clip, measure
+from eqs.benchmarks.simulators import (
+    PERIOD_US,
+    Job,
+    configured,
+    draw_clip,
+    light_milliseconds,
+    measure,
+)
 
 
 @pytest.fixture
@@ -28,3 +35,15 @@ def test_the_events_counted_are_those_of_the_whole_clip(folder: Path) -> None:
     clip, times_us = draw_clip(6, 40, 48, seed=3), PERIOD_US * np.arange(6)
     assert (frames, events) == (6, len(configured("ESIM", 0.05).simulate(clip, times_us)))
     assert cost.seconds > 0
+
+
+def test_a_network_that_learned_nothing_is_timed_as_one_that_did() -> None:
+    simulator = configured("EventGAN", 0.2)
+    clip = draw_clip(3, 32, 40)
+    assert len(simulator.simulate(clip, PERIOD_US * np.arange(3))) > 0
+
+
+def test_light_costs_a_table() -> None:
+    plain, linear = light_milliseconds(draw_clip(1, 32, 40)[0], repeats=3)
+    assert 0 < plain < 50
+    assert 0 < linear < 50
