@@ -19,6 +19,7 @@ from eqs.files import one_at_a_time, read_json, short_hash, whole_numbers, write
 from eqs.frames import FrameFolder, VideoFile, image_paths
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
+from eqs.pipelines.train_simulator import ensure_learned
 from eqs.simulators import Simulator
 
 log = logging.getLogger(__name__)
@@ -41,6 +42,7 @@ def simulate(cfg: DictConfig) -> None:
         found = "neither" if cfg.data is None else "both"
         raise ValueError(f"Expected a clip or a data set, got {found}; set frames or data")
     if cfg.data is None:
+        ensure_learned(simulator)
         simulate_clip(simulator, cfg)
     else:
         simulate_dataset(cfg)
