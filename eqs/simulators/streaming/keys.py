@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 
 from eqs.events import Events
 
-Fired = tuple[NDArray[np.int64], int]
+Keys = NDArray[np.int64]
+"""Event keys, or a buffer for them."""
+
+Fired = tuple[Keys, int]
 """A buffer of event keys, and how many of them count."""
 
 PIXEL_BITS = 26  # 67 million pixels

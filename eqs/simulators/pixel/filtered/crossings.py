@@ -22,7 +22,7 @@ from eqs.simulators.pixel.filtered.circuit import (
 from eqs.simulators.pixel.light_dependent import Approach, shrinkage, sub_steps
 from eqs.simulators.pixel.ramp_response import first_crossing, response
 from eqs.simulators.pixel.randomness import word_at, ziggurat_normal
-from eqs.simulators.streaming.keys import Fired, event_key, with_room
+from eqs.simulators.streaming.keys import Keys, event_key, with_room
 
 _LONGEST_BLUR = 3.0  # time constants by which noise delays an event at most
 
@@ -72,10 +72,10 @@ def _fire_step(
     span: tuple[float, float],
     draws: tuple[np.uint64, int],
     index: int,
-    fired: Fired,
-) -> tuple[Pixel, Fired]:
+    keys: Keys,
+    count: int,
+) -> tuple[Pixel, Keys, int]:
     """Events of a pixel in one sub-step, through which its filter goes as `way` says."""
-    keys, count = fired
     begin_us, step_us = span
     level, now_us = way.level, 0.0
     memory, ready_us, last_us = pixel.memory, pixel.ready_us, pixel.last_us
@@ -103,7 +103,7 @@ def _fire_step(
         count += 1
         memory = bounds[1] if up else bounds[0]
         ready_us = last_us + circuit.refractory_us
-    return Pixel(pixel.received, pixel.filtered, memory, ready_us, last_us), (keys, count)
+    return Pixel(pixel.received, pixel.filtered, memory, ready_us, last_us), keys, count
 
 
 @njit(cache=True)
@@ -115,11 +115,12 @@ def fire_signal(
     span: tuple[float, float],
     key: np.uint64,
     index: int,
-    fired: Fired,
-) -> tuple[Pixel, Fired]:
+    keys: Keys,
+    count: int,
+) -> tuple[Pixel, Keys, int]:
     """Events within an interval of the pixel number `index`, and that pixel at the end of it."""
     start_us, stop_us = span
-    draws = key, fired[1]  # of this pixel's events, whatever others fire
+    draws = key, count  # of this pixel's events, whatever others fire
     left_us = stop_us - start_us
     longest_us = left_us / sub_steps(ramp.slope * left_us)
     # No event may come before the interval.
@@ -132,8 +133,10 @@ def fire_signal(
         way, reached = sub_step(pixel, ramp, shrink, step_us, circuit)
         if pixel.ready_us != SEEING or not cannot_fire(pixel, ramp, step_us, comparator):
             step = stop_us - left_us, step_us
-            pixel, fired = _fire_step(way, pixel, comparator, circuit, step, draws, index, fired)
+            pixel, keys, count = _fire_step(
+                way, pixel, comparator, circuit, step, draws, index, keys, count
+            )
         pixel = moved(pixel, way, reached, ramp.leak, step_us, circuit)
         ramp = rest_of(ramp, shrink, step_us)
         left_us -= step_us
-    return pixel, fired
+    return pixel, keys, count

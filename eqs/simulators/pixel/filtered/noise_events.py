@@ -10,7 +10,7 @@ from numba import njit
 from eqs.simulators.pixel.filtered.circuit import SEEING, Circuit, Comparator, Pixel
 from eqs.simulators.pixel.first_passage import FARTHEST, passage_rate
 from eqs.simulators.pixel.randomness import uniform, word_at
-from eqs.simulators.streaming.keys import Fired, event_key, with_room
+from eqs.simulators.streaming.keys import Keys, event_key, with_room
 
 
 @njit(cache=True)
@@ -44,10 +44,10 @@ def fire_noise(
     span: tuple[float, float],
     key: np.uint64,
     index: int,
-    fired: Fired,
-) -> tuple[Pixel, Fired]:
+    keys: Keys,
+    count: int,
+) -> tuple[Pixel, Keys, int]:
     """Noise events of a pixel that the signal does not fire; each resets it to the signal."""
-    keys, count = fired
     now_us, stop_us = span
     ready_us, ordinal = SEEING, 0
     while now_us < stop_us:
@@ -62,4 +62,4 @@ def fire_noise(
         ready_us = now_us + circuit.refractory_us
         pixel = Pixel(pixel.received, pixel.filtered, pixel.filtered, ready_us, now_us)
         now_us = ready_us
-    return pixel, (keys, count)
+    return pixel, keys, count

@@ -89,7 +89,7 @@ def _fire(
     keys: NDArray[np.int64],
 ) -> Fired:
     """Events of an interval in which the log light of every pixel is a line."""
-    fired = keys, 0
+    count = 0
     span_us = span[1] - span[0]
     for index in range(end.codes.size):
         code = end.codes[index]
@@ -111,10 +111,14 @@ def _fire(
         if pixel.ready_us <= span[0] and cannot_fire(pixel, ramp, span_us, comparator):
             pixel = settled(pixel, ramp, span_us, circuit)
             if may_fire(pixel, comparator):
-                pixel, fired = fire_noise(pixel, comparator, circuit, span, key, index, fired)
+                pixel, keys, count = fire_noise(
+                    pixel, comparator, circuit, span, key, index, keys, count
+                )
         else:
-            pixel, fired = fire_signal(pixel, ramp, comparator, circuit, span, key, index, fired)
+            pixel, keys, count = fire_signal(
+                pixel, ramp, comparator, circuit, span, key, index, keys, count
+            )
         state.received[index], state.filtered[index] = pixel.received, pixel.filtered
         state.memory[index] = pixel.memory
         state.ready_us[index], state.last_us[index] = pixel.ready_us, pixel.last_us
-    return fired
+    return keys, count
