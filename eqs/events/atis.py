@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events.decoded import Decoded, blocks
 from eqs.events.words import room
+from eqs.kernels import njit
 
 HEADER, HEADER_BYTES = b"Event Stream", 20
 DVS = 1
@@ -47,7 +47,7 @@ def read_event_stream(path: Path, size: int) -> Iterator[Decoded]:
             )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _event_stream(content: NDArray[np.uint8], now: int) -> tuple[Any, ...]:
     """Events, the time of the last one, and how many bytes they took."""
     t, x, y, p = room(len(content) // 5)

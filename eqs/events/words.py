@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from eqs.kernels import njit
 
 # Places in a state, whose values are -1 as long as no word has told them.
 HIGH, TOLD, LOW, ROW, COLUMN, POLARITY, PLACES = range(7)
@@ -25,14 +26,14 @@ def untold() -> NDArray[np.int64]:
     return np.full(PLACES, -1, np.int64)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def room(most: int) -> tuple[Any, ...]:
     """Arrays for so many events."""
     places = np.empty((2, most), np.uint16)
     return np.empty(most, np.int64), places[0], places[1], np.empty(most, np.uint8)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def bits_in(value: Whole) -> int:
     """Number of bits that are set."""
     count = 0
@@ -42,7 +43,7 @@ def bits_in(value: Whole) -> int:
     return count
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def put(
     events: Columns, count: Whole, lanes: tuple[Whole, Whole], now: Whole, across: Whole, lit: Whole
 ) -> int:
@@ -68,7 +69,7 @@ def put(
     return int(count)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def libcaer_cmp(words: NDArray[np.uint16], state: NDArray[np.int64]) -> Arrays:
     """Words of 16 bits of one packet; times count from the packet's base, in microseconds.
 
@@ -104,7 +105,7 @@ def libcaer_cmp(words: NDArray[np.uint16], state: NDArray[np.int64]) -> Arrays:
     return t[:count], x[:count], y[:count], p[:count], dropped
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def counted(told: Whole, last: Whole, high: Whole, bits: int) -> Whole:
     """A time high of so many bits, counted on from the last: a fall of half its range is a turn."""
     if last < 0:
@@ -114,7 +115,7 @@ def counted(told: Whole, last: Whole, high: Whole, bits: int) -> Whole:
     return high + step + ((1 << bits) if step < -half else -(1 << bits) if step > half else 0)
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def evt2(words: NDArray[np.uint32], state: NDArray[np.int64]) -> Arrays:
     """Words of 32 bits: time high (28 bits of 64 us), or one event with 6 bits of time."""
     most = 0
@@ -140,7 +141,7 @@ def evt2(words: NDArray[np.uint32], state: NDArray[np.int64]) -> Arrays:
     return t[:count], x[:count], y[:count], p[:count], dropped
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def evt21(words: NDArray[np.uint64], state: NDArray[np.int64]) -> Arrays:
     """Words of 64 bits: time high, or up to 32 events of one row and one time."""
     most = 0
@@ -167,7 +168,7 @@ def evt21(words: NDArray[np.uint64], state: NDArray[np.int64]) -> Arrays:
     return t[:count], x[:count], y[:count], p[:count], dropped
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def events_in(words: NDArray[np.uint16]) -> int:
     """How many events words of EVT3 bring at most."""
     most = 0
@@ -180,7 +181,7 @@ def events_in(words: NDArray[np.uint16]) -> int:
     return most
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def evt3(words: NDArray[np.uint16], state: NDArray[np.int64]) -> Arrays:
     """Words of 16 bits that each change one thing: row, time, base column, or bring events.
 

@@ -10,10 +10,10 @@ import zlib
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from eqs.events import Events
+from eqs.kernels import njit
 
 
 def blank(events: Events) -> Events:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+
+from eqs.kernels import njit
 
 Detections = dict[str, Tensor]
 
@@ -63,7 +64,7 @@ def postprocess(
     return results
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def suppress(
     boxes: NDArray[np.float32], classes: NDArray[np.int64], threshold: float, limit: int
 ) -> NDArray[np.int64]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from eqs.events import Events
+from eqs.kernels import njit
 from eqs.representations.window import Span, events_inside
 
 HISTOGRAM_VERSION = 1
@@ -93,7 +93,7 @@ def _event_bins(t: NDArray[np.int64], bins: int) -> NDArray[np.int64]:
     return np.append(np.searchsorted(number, np.arange(bins), side="left"), len(t))
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _count(
     histogram: NDArray[np.uint8],
     firsts: NDArray[np.int64],

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from numba import njit
-
+from eqs.kernels import njit
 from eqs.scenes.optics import CAM_COS, CAM_SIN, CAM_X, CAM_Z, Array
 
 Lit = tuple[float, float, float, float]  # direction to the camera (x, z), headlights, lamps

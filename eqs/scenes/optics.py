@@ -6,8 +6,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from eqs.kernels import njit
 
 Array = NDArray[np.float64]
 

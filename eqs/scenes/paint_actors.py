@@ -9,9 +9,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.scenes.actors import ATOP, SHADOW, SOLID
 from eqs.scenes.optics import Array, coverage
 from eqs.scenes.paint_street import Picture

@@ -11,9 +11,9 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.scenes.light import AMBIENT, BEAM, BEAM_REACH_M, HAZE, HAZE_REACH
 from eqs.scenes.optics import (
     CAM_COS,

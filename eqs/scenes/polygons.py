@@ -6,9 +6,9 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.scenes.optics import MID_COLUMN, MID_ROW, Array, set_edges
 
 CORNERS: Final = 8

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.base import Simulator, require_positive
 from eqs.simulators.streaming.keys import event_key
 from eqs.simulators.streaming.pixels import Interval

@@ -15,24 +15,25 @@ ROOMS = {
     "eqs.extras": "",
     "eqs.files": "",
     "eqs.processors": "",
+    "eqs.kernels": "",
     "eqs.content": "processors",
-    "eqs.events": "clock extras files",
+    "eqs.events": "clock extras files kernels",
     "eqs.frames.networks": "files",
     "eqs.frames": "clock extras files frames.networks",
-    "eqs.representations": "events",
+    "eqs.representations": "events kernels",
     "eqs.drawing": "events extras files names",
-    "eqs.simulators.streaming": "events frames processors",
-    "eqs.simulators.pixel": "frames processors simulators.streaming",
-    "eqs.simulators.pixel.filtered": "frames simulators.pixel simulators.streaming",
-    "eqs.simulators": "events frames simulators.pixel simulators.pixel.filtered "
+    "eqs.simulators.streaming": "events frames kernels processors",
+    "eqs.simulators.pixel": "frames kernels processors simulators.streaming",
+    "eqs.simulators.pixel.filtered": "frames kernels simulators.pixel simulators.streaming",
+    "eqs.simulators": "events frames kernels simulators.pixel simulators.pixel.filtered "
     "simulators.streaming simulators.learned",
-    "eqs.simulators.learned": "files frames models simulators simulators.pixel "
+    "eqs.simulators.learned": "files frames kernels models simulators simulators.pixel "
     "simulators.streaming",
-    "eqs.scenes": "events files frames processors",
+    "eqs.scenes": "events files frames processors kernels",
     "eqs.data": "content events files frames processors simulators",
-    "eqs.models": "",
+    "eqs.models": "kernels",
     "eqs.metrics.baselines": "events metrics",
-    "eqs.metrics": "events extras files models representations",
+    "eqs.metrics": "events extras files kernels models representations",
     "eqs.training": "content data drawing events files frames metrics models representations "
     "simulators.learned",
     "eqs.study": "drawing files names",
@@ -45,7 +46,7 @@ ROOMS = {
 }
 # The published models: each builds on the simulator, its parts and the stream, and on no other.
 MODELS = ("dvs_voltmeter", "esim", "icns", "improved_esim", "prophesee", "v2e")
-MODEL = "frames simulators simulators.pixel simulators.streaming"
+MODEL = "frames kernels simulators simulators.pixel simulators.streaming"
 
 
 def expected() -> dict[str, set[str]]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from eqs.kernels import njit
 from eqs.simulators.pixel.randomness import normal, uniform, word_at, ziggurat_normal
 
 _SMALLEST_SQUARE = 1e-300

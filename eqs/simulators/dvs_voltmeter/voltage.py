@@ -11,9 +11,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.simulators.dvs_voltmeter.passage import (
     CERTAIN,
     chance_of_on,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.simulators.esim.fixed import ESIMPixels
 from eqs.simulators.pixel.crossing import (
     SMALLEST_CHANGE_LOG,

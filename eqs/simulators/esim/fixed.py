@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.esim.parameters import ESIM
 from eqs.simulators.pixel.crossing import (
     crossing_share,

@@ -6,10 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.icns.latency import SEEING, Delays, latency
 from eqs.simulators.icns.parameters import ICNS
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from eqs.kernels import njit
 from eqs.simulators.pixel.randomness import normal
 
 LONGEST_LATENCY_US = 10_000.0

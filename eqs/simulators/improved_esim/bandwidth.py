@@ -10,10 +10,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.improved_esim.parameters import ImprovedESIM
 from eqs.simulators.pixel.ramp_response import response
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.improved_esim.bandwidth import PixelFilter
 from eqs.simulators.improved_esim.parameters import ImprovedESIM
 from eqs.simulators.pixel.crossing import RELATIVE_TOLERANCE

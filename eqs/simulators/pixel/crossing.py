@@ -10,9 +10,9 @@ signal at the start, so that a pixel whose reference was moved from outside fall
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.simulators.streaming.keys import event_key
 
 # A signal counts as having reached a level it misses by this share of a threshold, so that a step

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.special import erfcx
+
+from eqs.kernels import njit
 
 FARTHEST = 7.0  # standard deviations; beyond it an event takes hours
 NEAREST = 0.05

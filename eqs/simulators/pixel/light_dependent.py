@@ -16,8 +16,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
+from eqs.kernels import njit
 from eqs.simulators.pixel.ramp_response import response
 
 STEP_LOG = 0.15  # of the light within a sub-step: the response is then right to 0.005

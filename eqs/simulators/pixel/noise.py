@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS, relative_light
 from eqs.simulators.pixel.randomness import draw_key, normal_map, poisson, uniform, word_at
 from eqs.simulators.streaming.keys import event_key

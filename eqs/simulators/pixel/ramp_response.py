@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from eqs.kernels import njit
 
 _ACCURACY_US = 1e-4
 _MOST_STEPS = 100

@@ -14,9 +14,9 @@ from functools import partial
 from statistics import NormalDist
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.processors import useful_bands
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)

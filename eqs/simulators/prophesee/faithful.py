@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.pixel.crossing import crossing_share, officially_crossed
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
 from eqs.simulators.pixel.randomness import draw_key, uniform, word_at

@@ -7,9 +7,9 @@ times, and gives the microsecond in which each leaves, or WAITS where that is no
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.simulators.streaming.keys import PIXEL_BITS, TIME_SHIFT
 
 Keys = NDArray[np.int64]

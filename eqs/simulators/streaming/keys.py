@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.events import Events
+from eqs.kernels import njit
 
 Keys = NDArray[np.int64]
 """Event keys, or a buffer for them."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS
 from eqs.simulators.pixel.randomness import draw_key, normal, uniform, word_at
 from eqs.simulators.streaming.keys import Fired, event_key, with_room

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.pixel.level_memory import LevelMemory
 from eqs.simulators.pixel.noise import shot_events
 from eqs.simulators.pixel.photoreceptor import MICROSECONDS, filter_share, lin_log

@@ -6,9 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from eqs.kernels import njit
 from eqs.simulators.pixel.light_dependent import (
     Approach,
     approach,

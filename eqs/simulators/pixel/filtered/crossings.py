@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from eqs.kernels import njit
 from eqs.simulators.pixel.filtered.circuit import (
     SEEING,
     Circuit,

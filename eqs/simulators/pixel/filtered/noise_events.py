@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from eqs.kernels import njit
 from eqs.simulators.pixel.filtered.circuit import SEEING, Circuit, Comparator, Pixel
 from eqs.simulators.pixel.first_passage import FARTHEST, passage_rate
 from eqs.simulators.pixel.randomness import uniform, word_at

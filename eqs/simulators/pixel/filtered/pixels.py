@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from eqs.frames import GreyImage
+from eqs.kernels import njit
 from eqs.simulators.pixel.filtered.circuit import (
     SEEING,
     Circuit,
