@@ -27,8 +27,8 @@ def main(arguments: Sequence[str], shown: str) -> None:
     parser.add_argument(
         "file",
         type=Path,
-        help="an event file of any kind that is read here, or a folder: a ROS 2 bag, or "
-        f"{EVENTS_TEXT} with images",
+        help="an event file of any kind that is read here, or a folder: a ROS 2 bag, a file for "
+        f"each tick of CARLA, or {EVENTS_TEXT} with images",
     )
     parser.add_argument(
         "out",

@@ -12,6 +12,14 @@ from eqs.events.aedat import read_aedat2, read_aedat3
 from eqs.events.aedat4 import read_aedat4
 from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
 from eqs.events.bag import BAGS, is_bag_folder
+from eqs.events.carla import (
+    RAW_SUFFIXES,
+    is_carla_array,
+    raw_records,
+    read_carla,
+    read_carla_array,
+    tick_files,
+)
 from eqs.events.decoded import Decoded, joined
 from eqs.events.hdf5 import DAMAGE, HDF5
 from eqs.events.hints import NOTHING_SAID, Hints
@@ -26,7 +34,7 @@ from eqs.events.text import read_text
 PIECE_BYTES = 1 << 20  # of vectors of events, some six million
 READ = (
     "DSEC, v2e, event_utils, MVSEC, M3ED and Metavision HDF5, RAW (EVT2, EVT2.1, EVT3), DAT, "
-    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, "
+    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, arrays of CARLA, 40-bit .bin, "
     "npy, npz, MATLAB, text and CSV"
 )
 
@@ -52,7 +60,7 @@ def open_events(
 def is_dsec(path: Path) -> bool:
     """Whether a file is HDF5 in the layout of DSEC; one that cannot be opened may be.
 
-    A folder, of a bag, is not.
+    A folder, of a bag or of a simulator's ticks, is not.
 
     Raises:
         FileNotFoundError: there is no such file.
@@ -87,7 +95,7 @@ def pieces(
     files of other programs come in one piece.
 
     Args:
-        path: the file, or the folder of a ROS 2 bag.
+        path: the file, or the folder of a ROS 2 bag or of the files of CARLA's ticks.
         hints: what the file leaves open.
         size: about how many bytes of the file make a piece.
 
@@ -114,6 +122,8 @@ def _pieces(path: Path, hints: Hints, size: int) -> Iterator[Decoded]:
         yield table(path, hints)
     elif path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv"):
         yield from read_text(path, size, hints)
+    elif path.suffix.lower() in RAW_SUFFIXES and (records := raw_records(path)) is not None:
+        yield read_carla(records, path, hints)
     elif read := _binary(first, path):
         yield from read(path, size)
     elif path.suffix.lower() == ".dat":
@@ -123,10 +133,13 @@ def _pieces(path: Path, hints: Hints, size: int) -> Iterator[Decoded]:
 
 
 def _of_folder(folder: Path, hints: Hints, size: int) -> Iterator[Decoded]:
-    """The events of a ROS 2 bag."""
-    if not is_bag_folder(folder):
-        raise ValueError(f"Expected a ROS 2 bag at {folder}, got another folder; name a file")
-    yield from read_bag(folder, hints)
+    """The events of a ROS 2 bag, or of a file for each tick; empty files are ticks without any."""
+    if is_bag_folder(folder):
+        yield from read_bag(folder, hints)
+        return
+    for path in tick_files(folder):
+        if path.stat().st_size:
+            yield from _pieces(path, hints, size)
 
 
 def _table(first: bytes, path: Path) -> Callable[[Path, Hints], Decoded] | None:
@@ -134,7 +147,7 @@ def _table(first: bytes, path: Path) -> Callable[[Path, Hints], Decoded] | None:
     if first[:8] == HDF5:
         return read_foreign_hdf5
     if first[:6] == b"\x93NUMPY":
-        return read_numpy
+        return read_carla_array if is_carla_array(path) else read_numpy
     if first[:4] == b"PK\x03\x04" and path.suffix == ".npz":
         return read_numpy
     return read_matlab if first.startswith(b"MATLAB ") else None
