@@ -32,7 +32,8 @@ ROOMS = {
     "eqs.study": "drawing files names",
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
     "models names processors simulators study training",
-    "eqs.benchmarks": "data events frames metrics models representations simulators training",
+    "eqs.benchmarks": "data events extras frames metrics models representations simulators "
+    "training",
     "eqs.commands": "benchmarks data drawing events extras files pipelines",
     "eqs.__main__": "commands",
 }
