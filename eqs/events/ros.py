@@ -22,6 +22,9 @@ from eqs.events.words import Arrays, evt3, libcaer_cmp, untold
 PACKET = ("event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray")
 ARRAY = ("dvs_msgs/msg/EventArray", "prophesee_event_msgs/msg/EventArray")
 LATEST_US = 100_000  # how late an event may come; what is later is another run, or a broken clock
+OTHERWISE = (
+    "cut the bag where its clock was set back, or set stamp=header if events' times are wrong"
+)
 RECORD = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p", "u1")])
 # What CDR makes of every record but the first: two bytes more before the seconds, one before all.
 ALIGNED = np.dtype(
@@ -73,7 +76,7 @@ def on_time(parts: Iterable[Decoded], path: Path) -> Iterator[Decoded]:
             worst = int(np.argmax(latest - part.t))
             before, time = int(latest[worst]), int(part.t[worst])
             if before - time > LATEST_US:
-                advice = backwards(before, time, "cut the bag where its clock was set back")
+                advice = backwards(before, time, OTHERWISE)
                 raise ValueError(
                     f"Expected events that come at most {LATEST_US} us late in {path}, got one at "
                     f"{time} us after one at {before} us; {advice}"
