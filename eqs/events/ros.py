@@ -22,9 +22,7 @@ from eqs.events.words import Arrays, evt3, libcaer_cmp, untold
 PACKET = ("event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray")
 ARRAY = ("dvs_msgs/msg/EventArray", "prophesee_event_msgs/msg/EventArray")
 LATEST_US = 100_000  # how late an event may come; what is later is another run, or a broken clock
-OTHERWISE = (
-    "cut the bag where its clock was set back, or set stamp=header if events' times are wrong"
-)
+OTHERWISE = "cut the bag where its clock was set back, or set stamp=header if event times are wrong"
 RECORD = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p", "u1")])
 # What CDR makes of every record but the first: two bytes more before the seconds, one before all.
 ALIGNED = np.dtype(
