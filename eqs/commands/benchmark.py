@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from eqs.benchmarks import event_files, interpolation, reading, rvt, scoring, simulators
+from eqs.benchmarks import bags, event_files, interpolation, reading, rvt, scoring, simulators
 from eqs.commands.fetch_interpolator import INTO
 
 
@@ -15,13 +15,15 @@ def main(arguments: Sequence[str], shown: str) -> None:
     """Read the command line and print one table."""
     parser = argparse.ArgumentParser(prog=shown, description=__doc__)
     parser.add_argument(
-        "what", choices=["simulators", "rvt", "eqs", "data", "files", "interpolation"]
+        "what", choices=["simulators", "rvt", "eqs", "data", "files", "bags", "interpolation"]
     )
     clip = parser.add_argument_group("simulators, eqs, data and interpolation")
     clip.add_argument("--frames", type=int, help="60 for simulators, 300 windows for eqs")
     clip.add_argument("--size", help="width and height; 128x96 for interpolation, else 640x480")
     clip.add_argument("--clip", type=Path, help="simulators: a folder of images, taken as 20 Hz")
-    clip.add_argument("--events", type=float, default=60e6, help="data, files: in a recording")
+    clip.add_argument(
+        "--events", type=float, help="in a recording: 60e6 for data and files, 6e6 for bags"
+    )
     clip.add_argument(
         "--only",
         nargs="*",
@@ -51,9 +53,11 @@ def print_table(given: argparse.Namespace, size: tuple[int, int]) -> None:
     elif given.what == "eqs":
         scoring.print_table(given.frames or 300, *size)
     elif given.what == "data":
-        reading.print_table(int(given.events), *size)
+        reading.print_table(int(given.events or 60e6), *size)
     elif given.what == "files":
-        event_files.print_table(int(given.events))
+        event_files.print_table(int(given.events or 60e6))
+    elif given.what == "bags":
+        bags.print_table(int(given.events or 6e6))
     elif given.what == "interpolation":
         interpolation.print_table(given.worlds, *size, given.networks)
     else:

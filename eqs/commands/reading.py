@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from eqs.events import Events
-from eqs.events.hints import UNITS_US, Hints
+from eqs.events.hints import STAMPS, UNITS_US, Hints
 from eqs.events.ordered import HELD, OrderedFile
 
 
@@ -22,6 +22,24 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--time-unit", choices=[*UNITS_US], help="unit of a table's times")
     parser.add_argument(
         "--first-pixel", type=int, choices=[0, 1], help="first row and column in a MATLAB file"
+    )
+    parser.add_argument(
+        "--topic",
+        action="append",
+        default=[],
+        metavar="TOPIC",
+        help="topic of a bag, where it holds several of events or of frames; once for each",
+    )
+    parser.add_argument(
+        "--stamp",
+        choices=STAMPS,
+        default="event",
+        help="time that counts in a bag's arrays: each event's own, or its message's",
+    )
+    parser.add_argument(
+        "--invert-polarity",
+        action="store_true",
+        help="the file calls darker what is called brighter here, as Gazebo's plugin does",
     )
     parser.add_argument(
         "--whole",
@@ -36,8 +54,9 @@ def hints(given: argparse.Namespace) -> Hints:
     Raises:
         ValueError: it says what no file can be.
     """
-    names = ("height", "width", "order", "time_unit", "first_pixel")
-    return Hints(**{name: getattr(given, name) for name in names})
+    names = ("height", "width", "order", "time_unit", "first_pixel", "stamp", "invert_polarity")
+    told = {name: getattr(given, name) for name in names}
+    return Hints(**told, topics=tuple(given.topic))
 
 
 def opened(path: Path, given: argparse.Namespace) -> OrderedFile:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from eqs.data.foreign_frames import Frame, foreign_frames
+from eqs.data.foreign_frames import foreign_frames
+from eqs.data.frame import Frame
 from eqs.data.places import EVENTS, EXPOSURES, FRAME_TIMES, FRAMES
 from eqs.events import Events, EventWriter
 from eqs.events.ordered import OrderedFile
 from eqs.files import complete_folder, write_text
 from eqs.frames import checked_times
+from eqs.frames.times import TIMES as CLIP_TIMES
 
 Passing = Callable[[Iterable[Events]], Iterable[Events]]
 
@@ -95,7 +97,7 @@ def write_recording(file: OrderedFile, source: Path, out: Path, passing: Passing
         (2, [20000, 50000])
     """
     with complete_folder(out) as folder:
-        frames = _checked(foreign_frames(source), source)
+        frames = _checked(foreign_frames(source, file.hints.topics), source)
         first = next(frames, None)
         if first is not None:
             file.fallback = first.picture.shape[0], first.picture.shape[1]
@@ -108,6 +110,26 @@ def write_recording(file: OrderedFile, source: Path, out: Path, passing: Passing
     return written._replace(frames=len(times_us))
 
 
+def write_clip(source: Path, topics: Sequence[str], out: Path) -> Written:
+    """Write the frames of a bag as a folder of PNG with their times, as `simulate frames=` takes.
+
+    Args:
+        source: the bag.
+        topics: the topic of frames.
+        out: the folder, which appears when it is complete; nothing may be there.
+
+    Raises:
+        ValueError: the bag is damaged, or has no two such frames at times that increase.
+    """
+    with complete_folder(out) as folder:
+        try:
+            times_us = _save_frames(_checked(foreign_frames(source, topics), source), folder)
+        except ValueError as error:
+            raise ValueError(f"{error} (the frames of {', '.join(topics)})") from error
+        _write_times(times_us, folder / CLIP_TIMES)
+    return Written(0, frames=len(times_us))
+
+
 def _checked(frames: Iterator[Frame], source: Path) -> Iterator[Frame]:
     """Frames that are all of one shape."""
     shape = None
@@ -116,31 +138,52 @@ def _checked(frames: Iterator[Frame], source: Path) -> Iterator[Frame]:
         if frame.picture.shape != shape:
             raise ValueError(
                 f"Expected frames of one shape in {source}, got {shape} and {frame.picture.shape}; "
-                "convert the events alone, to a name that ends in .h5"
+                "record one size, or convert the events alone, to a name that ends in .h5"
             )
         yield frame
 
 
 def _write_frames(frames: Iterable[Frame], folder: Path, source: Path) -> None:
-    (folder / FRAMES).mkdir(parents=True)
-    times_us, exposures = [], []
-    for index, frame in enumerate(frames):
-        picture = np.ascontiguousarray(frame.picture)
-        Image.fromarray(picture).save(folder / FRAMES / f"{index:06d}.png")
-        times_us.append(frame.time_us)
-        exposures.append(frame.exposure_us)
+    """Write frames, their times and, where all are known, their exposures where DSEC has them."""
+    exposures = []
+
+    def passing() -> Iterator[Frame]:
+        for frame in frames:
+            exposures.append(frame.exposure_us)
+            yield frame
+
     try:
-        if len(times_us) < 2:
-            raise ValueError("Expected at least two frames, got one; convert the events alone")
-        if times_us[0] < 0:
-            raise ValueError(f"Expected times of zero or more, got {times_us[0]} us; shift them")
-        checked_times(np.array(times_us), len(times_us))
+        times_us = _save_frames(passing(), folder / FRAMES)
     except ValueError as error:
         raise ValueError(f"{error} (the frames of {source}; OUT.h5 leaves them out)") from error
-    write_text("".join(f"{time_us}\n" for time_us in times_us), folder / FRAME_TIMES)
+    _write_times(times_us, folder / FRAME_TIMES)
     known = [f"{each[0]}, {each[1]}\n" for each in exposures if each is not None]
     if len(known) == len(times_us):
         write_text("".join(known), folder / EXPOSURES)
+
+
+def _save_frames(frames: Iterable[Frame], folder: Path) -> list[int]:
+    """Write frames as PNG, numbered from zero; gives their times.
+
+    Raises:
+        ValueError: there is one only, or the times are below zero or do not increase.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    times_us = []
+    for index, frame in enumerate(frames):
+        Image.fromarray(np.ascontiguousarray(frame.picture)).save(folder / f"{index:06d}.png")
+        times_us.append(frame.time_us)
+    if len(times_us) < 2:
+        count = "one" if times_us else "none"
+        raise ValueError(f"Expected at least two frames, got {count}")
+    if times_us[0] < 0:
+        raise ValueError(f"Expected times of zero or more, got {times_us[0]} us; shift them")
+    checked_times(np.array(times_us), len(times_us))
+    return times_us
+
+
+def _write_times(times_us: Iterable[int], path: Path) -> None:
+    write_text("".join(f"{time_us}\n" for time_us in times_us), path)
 
 
 def _of_size(pieces: Iterable[Events], frame: Frame | None, source: Path) -> Iterator[Events]:

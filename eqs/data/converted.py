@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from eqs.content import content_hash
@@ -31,7 +31,7 @@ def converted(
     """
     if is_dsec(path):
         return path
-    read_as = short_hash([height, width, asdict(hints)])
+    read_as = short_hash([height, width, hints.record()])
     kept = Path(folder) / f"{path.stem}-{content_hash(path)}-{read_as}.h5"
     if not kept.exists():
         with one_at_a_time(kept, f"converting {path}"):

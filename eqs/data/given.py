@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -113,7 +113,7 @@ class GivenStreams:
         files = [path for path in files if not any(part.startswith(".") for part in path.parts)]
         names = [path.as_posix() for path in files]
         content = content_hashes(folder / path for path in files)
-        read_as = [self.given.from_first_frame, asdict(self.given.hints)]
+        read_as = [self.given.from_first_frame, self.given.hints.record()]
         return f"{self.given.name}-{short_hash(['given', names, content, read_as])}"
 
     def path(self, recording: Recording) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -10,6 +11,15 @@ import h5py
 from eqs.events.aedat import read_aedat2, read_aedat3
 from eqs.events.aedat4 import read_aedat4
 from eqs.events.atis import HEADER, read_event_stream, read_forty_bits
+from eqs.events.bag import BAGS, is_bag_folder
+from eqs.events.carla import (
+    RAW_SUFFIXES,
+    is_carla_array,
+    raw_records,
+    read_carla,
+    read_carla_array,
+    tick_files,
+)
 from eqs.events.decoded import Decoded, joined
 from eqs.events.hdf5 import DAMAGE, HDF5
 from eqs.events.hints import NOTHING_SAID, Hints
@@ -17,14 +27,15 @@ from eqs.events.loaded import LoadedEvents
 from eqs.events.matlab import read_matlab
 from eqs.events.raw import read_prophesee
 from eqs.events.reader import EventReader
-from eqs.events.ros import BAGS, read_bag
+from eqs.events.ros import read_bag
 from eqs.events.tables import read_foreign_hdf5, read_numpy
 from eqs.events.text import read_text
 
 PIECE_BYTES = 1 << 20  # of vectors of events, some six million
 READ = (
     "DSEC, v2e, event_utils, MVSEC, M3ED and Metavision HDF5, RAW (EVT2, EVT2.1, EVT3), DAT, "
-    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, 40-bit .bin, npy, npz, MATLAB, text and CSV"
+    "AEDAT 2, 3.1 and 4, Event Stream, ROS bags, arrays of CARLA, 40-bit .bin, "
+    "npy, npz, MATLAB, text and CSV"
 )
 
 
@@ -49,9 +60,13 @@ def open_events(
 def is_dsec(path: Path) -> bool:
     """Whether a file is HDF5 in the layout of DSEC; one that cannot be opened may be.
 
+    A folder, of a bag or of a simulator's ticks, is not.
+
     Raises:
         FileNotFoundError: there is no such file.
     """
+    if path.is_dir():
+        return False
     if first_bytes(path)[:8] != HDF5:
         return path.suffix.lower() in (".h5", ".hdf5")  # whose reader says what is wrong
     try:
@@ -80,7 +95,7 @@ def pieces(
     files of other programs come in one piece.
 
     Args:
-        path: the file.
+        path: the file, or the folder of a ROS 2 bag or of the files of CARLA's ticks.
         hints: what the file leaves open.
         size: about how many bytes of the file make a piece.
 
@@ -88,28 +103,54 @@ def pieces(
         FileNotFoundError: there is no such file.
         ValueError: the file is of no known kind, or damaged, or fits several readings.
     """
-    path = Path(path)
+    for part in _pieces(Path(path), hints, size):
+        yield replace(part, p=1 - part.p) if hints.invert_polarity else part
+
+
+def _pieces(path: Path, hints: Hints, size: int) -> Iterator[Decoded]:
+    if path.is_dir():
+        yield from _of_folder(path, hints, size)
+        return
     first = first_bytes(path)
-    if first[:8] == HDF5:
-        yield read_foreign_hdf5(path, hints)
-    elif first.startswith(BAGS):
-        yield from read_bag(path)
+    if first.startswith(BAGS):
+        yield from read_bag(path, hints)
     elif first.startswith(b"#!AER-DAT2"):
         yield from read_aedat2(path, size, hints)
     elif first.startswith(b"#!AER-DAT4"):
         yield from read_aedat4(path)
-    elif first[:6] == b"\x93NUMPY" or (first[:4] == b"PK\x03\x04" and path.suffix == ".npz"):
-        yield read_numpy(path, hints)
-    elif first.startswith(b"MATLAB "):
-        yield read_matlab(path, hints)
+    elif table := _table(first, path):
+        yield table(path, hints)
     elif path.suffix.lower() in (".txt", ".csv", ".zip", ".tsv"):
         yield from read_text(path, size, hints)
+    elif path.suffix.lower() in RAW_SUFFIXES and (records := raw_records(path)) is not None:
+        yield read_carla(records, path, hints)
     elif read := _binary(first, path):
         yield from read(path, size)
     elif path.suffix.lower() == ".dat":
         yield from read_text(path, size, hints)
     else:
         raise ValueError(f"Expected {READ} in {path}, got none of them; convert it")
+
+
+def _of_folder(folder: Path, hints: Hints, size: int) -> Iterator[Decoded]:
+    """The events of a ROS 2 bag, or of a file for each tick; empty files are ticks without any."""
+    if is_bag_folder(folder):
+        yield from read_bag(folder, hints)
+        return
+    for path in tick_files(folder):
+        if path.stat().st_size:
+            yield from _pieces(path, hints, size)
+
+
+def _table(first: bytes, path: Path) -> Callable[[Path, Hints], Decoded] | None:
+    """What reads a table that comes in one piece, if the file is one."""
+    if first[:8] == HDF5:
+        return read_foreign_hdf5
+    if first[:6] == b"\x93NUMPY":
+        return read_carla_array if is_carla_array(path) else read_numpy
+    if first[:4] == b"PK\x03\x04" and path.suffix == ".npz":
+        return read_numpy
+    return read_matlab if first.startswith(b"MATLAB ") else None
 
 
 def _binary(first: bytes, path: Path) -> Callable[[Path, int], Iterator[Decoded]] | None:

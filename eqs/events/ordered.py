@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -70,7 +71,8 @@ class OrderedFile:
             self.span_us = reader.span_us
             cuts = reader.cuts_us(PIECE_EVENTS)
             for start, stop in pairwise(cuts):
-                yield reader.window(start, stop)
+                piece = reader.window(start, stop)
+                yield replace(piece, p=1 - piece.p) if self.hints.invert_polarity else piece
 
     def _of_others(self) -> Iterator[Events]:
         for part in in_order(self._counted(), self.held, self.path):

@@ -1,154 +1,88 @@
 """Events in ROS 1 and ROS 2 bags and MCAP files.
 
-Source: the message definitions of `event_camera_msgs`, `event_array_msgs` and `dvs_msgs`, and the
-serialisation rules of ROS 1 and of CDR.
+Source: the message definitions of `event_camera_msgs`, `event_array_msgs`, `dvs_msgs` and
+`prophesee_event_msgs`, and the serialisation rules of ROS 1 and of CDR.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.events.bounded import BoundedPath
+from eqs.clock import backwards
+from eqs.events.bag import Bag, Message, one_topic
 from eqs.events.decoded import Clock, Decoded
+from eqs.events.hints import NOTHING_SAID, Hints
 from eqs.events.words import Arrays, evt3, libcaer_cmp, untold
-from eqs.extras import needed
 
 PACKET = ("event_camera_msgs/msg/EventPacket", "event_array_msgs/msg/EventArray")
 ARRAY = ("dvs_msgs/msg/EventArray", "prophesee_event_msgs/msg/EventArray")
-IMAGE = ("sensor_msgs/msg/Image",)
-ROS1 = b"#ROSBAG"
-BAGS = (ROS1, b"SQLite format 3", b"\x89MCAP")  # what they begin with
+LATEST_US = 100_000  # how late an event may come; what is later is another run, or a broken clock
+OTHERWISE = "cut the bag where its clock was set back, or set stamp=header if event times are wrong"
+RECORD = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p", "u1")])
+# What CDR makes of every record but the first: two bytes more before the seconds, one before all.
+ALIGNED = np.dtype(
+    {"names": ["x", "y", "s", "ns", "p"], "formats": ["<u2", "<u2", "<u4", "<u4", "u1"],
+     "offsets": [1, 3, 7, 11, 15], "itemsize": 16}
+)  # fmt: skip
 
 
-class Message:
-    """Reads one message's bytes field by field.
-
-    Args:
-        raw: the bytes.
-        ros1: whether fields follow each other without gaps, as in ROS 1; CDR aligns them.
-    """
-
-    def __init__(self, raw: bytes, *, ros1: bool) -> None:
-        """Begin at the first field."""
-        self.raw, self.ros1 = raw, ros1
-        self.start = self.at = 0 if ros1 else 4
-        self.stamp_us = 0
-
-    def number(self, size: int) -> int:
-        """The next whole number of so many bytes.
-
-        Raises:
-            ValueError: the message ends before.
-        """
-        if not self.ros1:
-            self.at = self.start + -(-(self.at - self.start) // size) * size
-        value = self.raw[self.at : self.at + size]
-        if len(value) < size:
-            raise ValueError("Expected whole messages, got one that was cut off; record it again")
-        self.at += size
-        return int.from_bytes(value, "little")
-
-    def text(self) -> str:
-        """The next text."""
-        return self.bytes().rstrip(b"\0").decode("latin-1")
-
-    def bytes(self) -> bytes:
-        """The next row of bytes."""
-        count = self.number(4)
-        self.at += count
-        return bytes(self.raw[self.at - count : self.at])
-
-    def header(self) -> tuple[int, int]:
-        """Height and width, which follow the stamp and the frame's name; the stamp is kept."""
-        if self.ros1:
-            self.number(4)
-        self.stamp_us = 1_000_000 * self.number(4) + self.number(4) // 1000
-        self.text()
-        return self.number(4), self.number(4)
-
-
-class Bag:
-    """A bag, open in the block: its topics, and the bytes of their messages.
-
-    Args:
-        path: the file.
+def read_bag(path: Path, hints: Hints = NOTHING_SAID) -> Iterator[Decoded]:
+    """Events of the only topic with events in a bag, or of the one that is named.
 
     Raises:
-        ValueError: the bag is damaged, or rosbags, the optional dependency `ros`, is not installed.
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Find out of which version it is."""
-        self.path = path
-        with path.open("rb") as file:
-            self.ros1 = file.read(len(ROS1)) == ROS1
-
-    def __enter__(self) -> Self:
-        """Open the bag."""
-        with needed("ros", f"to read {self.path}"):
-            from rosbags.rosbag1 import Reader as Reader1
-            from rosbags.rosbag2 import Reader as Reader2
-        with self._whole():
-            self._reader = (Reader1 if self.ros1 else Reader2)(BoundedPath(self.path))
-            self._reader.open()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the bag."""
-        self._reader.close()
-
-    def topics(self, kinds: Collection[str]) -> list[Any]:
-        """The topics of these kinds of messages."""
-        return [each for each in self._reader.connections if each.msgtype in kinds]
-
-    def listed(self) -> str:
-        """All topics and their kinds."""
-        return ", ".join(f"{each.topic} ({each.msgtype})" for each in self._reader.connections)
-
-    def messages(self, topic: Any) -> Iterator[bytes]:  # noqa: ANN401 - the library's own type
-        """The bytes of a topic's messages."""
-        with self._whole():
-            found = self._reader.messages(connections=[topic])
-        while True:
-            with self._whole():
-                message = next(found, None)
-            if message is None:
-                return
-            yield bytes(message[2])
-
-    @contextmanager
-    def _whole(self) -> Iterator[None]:
-        try:
-            yield
-        except Exception as error:  # the library raises whatever damage leads it to
-            raise ValueError(f"Expected a whole bag at {self.path}, got: {error}") from error
-
-
-def read_bag(path: Path) -> Iterator[Decoded]:
-    """Events of the only topic with events in a bag.
-
-    Raises:
-        ValueError: there is none, or there are several, or their encoding is not read here, or the
-            bag is damaged; or rosbags, the optional dependency `ros`, is not installed.
+        ValueError: there is none, or there are several, or their encoding is not read here, or an
+            event comes too late to be of the same run, or the bag is damaged; or rosbags, the
+            optional dependency `ros`, is not installed.
     """
     with Bag(path) as bag:
-        found = bag.topics((*PACKET, *ARRAY))
-        if len(found) != 1:
+        topic = one_topic(bag, (*PACKET, *ARRAY), "events", hints.topics)
+        if topic is None:
             raise ValueError(
-                f"Expected one topic of events ({', '.join((*PACKET, *ARRAY))}) in {path}, "
-                f"got {bag.listed() or 'none'}; write the one that is meant into a bag of its own"
+                f"Expected a topic of events ({', '.join((*PACKET, *ARRAY))}) in {path}, got "
+                f"{', '.join(hints.topics) or bag.listed()}; name one with --topic, or a topic of "
+                "frames to get those"
             )
-        messages = bag.messages(found[0])
-        if found[0].msgtype in PACKET:
-            yield from packets(messages, path, ros1=bag.ros1)
+        messages = bag.messages(topic)
+        if bag.kinds[topic] in ARRAY:
+            found = arrays(messages, ros1=bag.ros1, stamp=hints.stamp)
+        elif hints.stamp == "event":
+            found = packets(messages, path, ros1=bag.ros1)
         else:
-            yield from arrays(messages, ros1=bag.ros1)
+            raise ValueError(
+                f"Expected arrays of events in {path}, whose messages have a stamp for all of "
+                f"them, got {topic} ({bag.kinds[topic]}); set stamp=event"
+            )
+        yield from on_time(found, path)
+
+
+def on_time(parts: Iterable[Decoded], path: Path) -> Iterator[Decoded]:
+    """The parts of one run of a recorder, whose events come at most a tenth of a second late.
+
+    Raises:
+        ValueError: one comes later than that.
+    """
+    newest: int | None = None
+    for part in parts:
+        if part.late(newest):
+            latest = np.maximum.accumulate(part.t)
+            latest = latest if newest is None else np.maximum(latest, newest)
+            worst = int(np.argmax(latest - part.t))
+            before, time = int(latest[worst]), int(part.t[worst])
+            if before - time > LATEST_US:
+                advice = backwards(before, time, OTHERWISE)
+                raise ValueError(
+                    f"Expected events that come at most {LATEST_US} us late in {path}, got one at "
+                    f"{time} us after one at {before} us; {advice}"
+                )
+        if len(part.t):
+            last = int(part.t.max())
+            newest = last if newest is None else max(last, newest)
+        yield part
 
 
 def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Iterator[Decoded]:
@@ -165,7 +99,7 @@ def packets(messages: Iterator[bytes], path: Path, *, ros1: bool) -> Iterator[De
     }  # fmt: skip
     for raw in messages:
         message = Message(raw, ros1=ros1)
-        height, width = message.header()
+        height, width = message.sized_header()
         message.number(8)
         base_ns, encoding = message.number(8), message.text()
         message.number(1)
@@ -224,38 +158,44 @@ def _mono(content: bytes, base_ns: int) -> Arrays:
     return t, x, y, (place >> 31).astype(np.uint8), 0
 
 
-def arrays(messages: Iterator[bytes], *, ros1: bool) -> Iterator[Decoded]:
-    """Events of arrays, each with a time of its own."""
+def arrays(messages: Iterator[bytes], *, ros1: bool, stamp: str = "event") -> Iterator[Decoded]:
+    """Events of arrays, each with a time of its own.
+
+    Args:
+        messages: the bytes of each array.
+        ros1: whether they are serialised as in ROS 1.
+        stamp: `header` where all events of an array have the time of its header.
+    """
     for raw in messages:
         message = Message(raw, ros1=ros1)
-        height, width = message.header()
-        fields = _records(message, message.number(4), ros1=ros1)
-        t = fields[:, 2] * 1_000_000 + fields[:, 3] // 1000
+        height, width = message.sized_header()
+        x, y, s, ns, p = _records(message, message.number(4), ros1=ros1)
+        if stamp == "header":
+            t = np.full(len(x), message.stamp_us, np.int64)
+        else:
+            t = s.astype(np.int64) * 1_000_000 + ns // 1000
         yield Decoded(
-            kind="a bag of event arrays", t=t, x=fields[:, 0], y=fields[:, 1], p=fields[:, 4],
+            kind="a bag of event arrays", t=t, x=x, y=y, p=p,
             height=height or None, width=width or None,
         )  # fmt: skip
 
 
-def _records(message: Message, count: int, *, ros1: bool) -> NDArray[np.int64]:
+def _records(message: Message, count: int, *, ros1: bool) -> list[NDArray[Any]]:
     """The fields x, y, seconds, nanoseconds and polarity of so many events.
 
     Convention: CDR aligns every number by itself, so the first event differs from the others: its
     seconds follow x and y at once, theirs come after two bytes more.
     """
-    packed = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p", "u1")])
     if ros1:
-        whole = min(count, (len(message.raw) - message.at) // packed.itemsize)
-        table = np.frombuffer(message.raw, packed, whole, message.at)
-        return np.stack([table[name].astype(np.int64) for name in packed.names or ()], axis=1)
-    rows = [[message.number(size) for size in (2, 2, 4, 4, 1)] for _ in range(min(count, 1))]
-    spread = np.dtype(
-        {"names": ["x", "y", "s", "ns", "p"], "formats": ["<u2", "<u2", "<u4", "<u4", "u1"],
-         "offsets": [0, 2, 6, 10, 14], "itemsize": 16}
-    )  # fmt: skip
-    at = message.at + (message.at - message.start) % 2
-    rest = max(0, min(count - 1, (len(message.raw) - at + 1) // spread.itemsize))
-    body = message.raw[at : at + rest * spread.itemsize].ljust(rest * spread.itemsize, b"\0")
-    table = np.frombuffer(body, spread, rest)
-    others = np.stack([table[name].astype(np.int64) for name in spread.names or ()], axis=1)
-    return np.concatenate([np.array(rows, np.int64).reshape(-1, 5), others])
+        table = _table(message, RECORD, count)
+        return [table[name] for name in RECORD.fields or ()]
+    first = _table(message, RECORD, min(count, 1))
+    message.at += RECORD.itemsize
+    others = _table(message, ALIGNED, max(count - 1, 0))
+    return [np.concatenate([first[name], others[name]]) for name in RECORD.fields or ()]
+
+
+def _table(message: Message, kind: np.dtype[Any], count: int) -> NDArray[Any]:
+    """So many records from here on, or those that are there of a message that was cut off."""
+    whole = min(count, max(0, len(message.raw) - message.at) // kind.itemsize)
+    return np.frombuffer(message.raw, kind, whole, message.at if whole else 0)

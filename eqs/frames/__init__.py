@@ -3,7 +3,7 @@
 from eqs.frames.checks import WHITE, checked_frames, checked_times
 from eqs.frames.flow import FlowInterpolation
 from eqs.frames.folder import FrameFolder, image_paths
-from eqs.frames.image import IMAGE_SUFFIXES, image_size, read_image
+from eqs.frames.image import IMAGE_SUFFIXES, image_size, read_image, require_opaque
 from eqs.frames.interpolation import (
     CachedInterpolation,
     Interpolation,
@@ -41,4 +41,5 @@ __all__ = [
     "luma",
     "read_image",
     "remapped",
+    "require_opaque",
 ]

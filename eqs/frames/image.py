@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from eqs.extras import needed
+from eqs.frames.exr import SUFFIX, exr_size, read_exr
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".npy")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".npy", SUFFIX)
 GREY_MODES = ("L", "1")
 COLOUR_MODES = ("RGB", "P")
 ALPHA_MODES = {"LA": "L", "PA": "RGB", "RGBA": "RGB", "La": "L", "RGBa": "RGB"}
@@ -27,16 +28,18 @@ def read_image(path: Path | str, white: float | None = None) -> NDArray[Any]:
     floating ones are float32 and keep all of their depth. Alpha is left out where all is opaque.
 
     Args:
-        path: the file; a renderer's arrays come as `.npy`, (H, W) or (H, W, 3).
+        path: the file; a renderer's arrays come as `.npy`, (H, W) or (H, W, 3), or as `.exr`.
         white: level that is white in floating images; whole numbers say it by their depth.
 
     Raises:
         ValueError: the file is no readable image of 8 or 16 bits, is transparent somewhere, is a
             TIFF on its side, or is floating and nobody says what is white; or OpenCV, the optional
-            dependency `flow`, is not installed, which 16 bits of colour take.
+            dependency `flow`, is not installed, which 16 bits of colour take, or OpenEXR, `exr`.
     """
     if Path(path).suffix.lower() == ".npy":
         return _of_array(_array(path), white, path)
+    if Path(path).suffix.lower() == SUFFIX:
+        return _of_exr(read_exr(path), white, path)
     try:
         with Image.open(path) as image:
             upright = _orientation(image)
@@ -59,6 +62,8 @@ def image_size(path: Path | str) -> tuple[int, int]:
     if Path(path).suffix.lower() == ".npy":
         height, width = _array(path).shape[:2]
         return height, width
+    if Path(path).suffix.lower() == SUFFIX:
+        return exr_size(path)
     try:
         with Image.open(path) as image:
             width, height = image.size
@@ -93,6 +98,13 @@ def _of_array(array: NDArray[Any], white: float | None, path: Path | str) -> NDA
     raise ValueError(
         f"Expected 8 or 16 bits or floating numbers in {path}, got {array.dtype}; convert it"
     )
+
+
+def _of_exr(levels: NDArray[np.float32], white: float | None, path: Path | str) -> NDArray[Any]:
+    if levels.ndim == 3 and levels.shape[2] == 4:
+        require_opaque(levels[..., 3] >= 1, path)
+        levels = levels[..., :3]
+    return _levels(levels.astype(np.float64), white, path)
 
 
 def _orientation(image: Image.Image) -> int:

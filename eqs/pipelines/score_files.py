@@ -13,6 +13,7 @@ from omegaconf import DictConfig
 from rich.console import Console
 from rich.table import Table
 
+from eqs.events.bag import is_bag_folder
 from eqs.events.formats import open_events
 from eqs.extras import DISTRIBUTION
 from eqs.files import complete_file, read_json, write_json
@@ -70,7 +71,8 @@ def score_files(cfg: DictConfig) -> None:
     """
     out = Path(cfg.out)
     refuse_others(out)
-    folders = [Path(path).is_dir() for path in (cfg.simulated, cfg.real)]
+    paths = [Path(path) for path in (cfg.simulated, cfg.real)]
+    folders = [path.is_dir() and not is_bag_folder(path) for path in paths]
     if any(folders) and not all(folders):
         raise ValueError(
             f"Expected two files or two folders, got one of each: {cfg.simulated} and {cfg.real}; "

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -15,15 +14,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from eqs.content import content_hash, content_hashes
 from eqs.data.simulated import write_stream
 from eqs.events.writer import LONGEST_US
-from eqs.files import one_at_a_time, read_json, short_hash, whole_numbers, write_json
+from eqs.files import one_at_a_time, read_json, short_hash, write_json
 from eqs.frames import FrameFolder, VideoFile, image_paths
+from eqs.frames.times import TIMES, counted_times, frame_times, times_file
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
 from eqs.pipelines.train_simulator import ensure_learned
 from eqs.simulators import Simulator
 
 log = logging.getLogger(__name__)
-TIMES = "timestamps.txt"
 
 
 @explained
@@ -73,7 +72,7 @@ def simulate_clip(simulator: Simulator, cfg: DictConfig) -> None:
         )
     if out.exists() and source.exists() and out.samefile(source):
         raise ValueError(f"Expected events beside the clip, got out={out} for both; set out")
-    clip = open_clip(source, cfg.frames_per_second, cfg.white)
+    clip = open_clip(source, cfg.frames_per_second, cfg.white, cfg.time_unit, cfg.frame_numbers)
     check_times(clip)
     description = {
         "simulator": simulator.name,
@@ -136,34 +135,39 @@ def check_times(clip: FrameFolder | VideoFile) -> None:
 
 
 def open_clip(
-    source: Path, frames_per_second: float | None, white: float | None = None
+    source: Path,
+    frames_per_second: float | None,
+    white: float | None = None,
+    time_unit: str | None = None,
+    frame_numbers: bool | None = None,
 ) -> FrameFolder | VideoFile:
     """A folder of images with its times, or a video with those it carries.
 
-    The times of a folder are those in `timestamps.txt` in or beside it, whole microseconds, one a
-    line; without that file they follow from the frame rate.
+    The times of a folder are those in `timestamps.txt` in or beside it, see `frame_times`; without
+    that file they follow from the frame rate, see `counted_times`.
 
     Raises:
-        ValueError: a folder has neither times nor a frame rate, or a video is given a rate.
+        ValueError: a folder has neither times nor a frame rate, or a video is given what only
+            folders need.
     """
     if not source.is_dir():
-        if frames_per_second is not None:
+        if frames_per_second is not None or time_unit is not None:
             raise ValueError(
                 f"Expected no frame rate for {source}, whose frames carry times; leave "
-                "frames_per_second out"
+                "frames_per_second and time_unit out"
             )
         return VideoFile(source)
-    files = [folder / TIMES for folder in (source, source.parent) if (folder / TIMES).is_file()]
-    if files and frames_per_second is None:
-        return FrameFolder(source, whole_numbers(files[0]).reshape(-1), white=white)
+    images = image_paths(source)
+    file = times_file(source, time_unit) if frames_per_second is None else None
+    if file is not None:
+        return FrameFolder(images, frame_times(*file, images), white=white)
     if frames_per_second is None or not frames_per_second > 0:
         raise ValueError(
             f"Expected {TIMES} in {source} or beside it, or a frame rate above zero, got "
             f"{frames_per_second!r}; set frames_per_second"
         )
-    count = len(image_paths(source))
-    times = np.arange(count, dtype=np.int64) * 1_000_000 / frames_per_second
-    return FrameFolder(source, np.floor(times).astype(np.int64), white=white)
+    times_us = counted_times(images, frames_per_second, frame_numbers)
+    return FrameFolder(images, times_us, white=white)
 
 
 def write_events(simulator: Simulator, clip: FrameFolder | VideoFile, out: Path) -> tuple[int, int]:

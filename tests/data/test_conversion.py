@@ -159,7 +159,7 @@ def test_frames_of_another_clock_or_size_are_refused_and_nothing_is_left(
     ends(source, tmp_path / "out", "Expected one topic of frames")
     odd = ("/image", "sensor_msgs/msg/Image", 9, image(pictures[0], "bayer_rggb8", 9, True))
     source = write_bag(tmp_path / "f.bag", [messages[0], odd])
-    ends(source, tmp_path / "out", "Expected frames of mono8, 8UC1, rgb8, bgr8")
+    ends(source, tmp_path / "out", "Expected frames of mono8, 8UC1, mono16, 16UC1, rgb8")
 
 
 def test_converted_recordings_are_a_data_set(tmp_path, events, pictures):

@@ -321,6 +321,20 @@ def save73(path, variables):
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
 
 
+def carla(events):
+    """CARLA's records, which are packed."""
+    kind = [("x", "<u2"), ("y", "<u2"), ("t", "<i8"), ("pol", "?")]
+    table = np.zeros(len(events), kind)
+    for name, values in {
+        "x": events.x,
+        "y": events.y,
+        "t": events.t * 1000,
+        "pol": events.p,
+    }.items():
+        table[name] = values
+    return table
+
+
 def columns(events):
     return {name: getattr(events, name) for name in "txyp"}
 
@@ -420,6 +434,8 @@ WRITERS = {
         path, events, {f"events/{n}s": v for n, v in columns(events).items()}
     ),
     "x.hdf5": mvsec_with_frames, "y.bag": bag_with_frames, "z.zip": zip_with_frames,
+    "carla.npy": lambda path, events: np.save(path, carla(events)),
+    "carla.raw": lambda path, events: path.write_bytes(carla(events).tobytes()),
     "frames.aedat4": lambda path, events: path.write_bytes(aedat4_with_frames(events)),
 }  # fmt: skip
 TOLD = {

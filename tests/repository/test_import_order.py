@@ -39,7 +39,7 @@ ROOMS = {
     "eqs.study": "drawing files names",
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
     "models names processors simulators simulators.learned study training",
-    "eqs.benchmarks": "data events frames metrics models representations scenes simulators "
+    "eqs.benchmarks": "data events extras frames metrics models representations scenes simulators "
     "simulators.learned training",
     "eqs.commands": "benchmarks data drawing events extras files frames.networks pipelines",
     "eqs.__main__": "commands",
