@@ -18,12 +18,25 @@ DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "simulators.md"
 
 
-def test_the_example_simulator_fires_at_frames():
-    (block,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+FRAMES = np.array([[[100, 100, 100]], [[100, 140, 60]]], np.uint8)
+
+
+def example(number):
+    """What an example of the page on simulators defines."""
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
     made = {"__name__": "document"}
-    exec(block, made)
-    frames = np.array([[[100, 100, 100]], [[100, 140, 60]]], np.uint8)
-    events = made["FrameDifference"]().simulate(frames, [0, 50_000])
+    exec(blocks[number], made)
+    return made
+
+
+def test_the_example_network_fires_where_it_expects_events():
+    events = example(0)["simulator"].simulate(FRAMES, [0, 50_000])
+    assert set(zip(events.x.tolist(), events.p.tolist(), strict=True)) == {(1, 1), (2, 0)}
+
+
+def test_the_example_simulator_fires_at_frames():
+    made = example(1)
+    events = made["FrameDifference"]().simulate(FRAMES, [0, 50_000])
     assert events.t.tolist() == [50_000, 50_000]
     assert (events.x.tolist(), events.p.tolist()) == ([1, 2], [1, 0])
 
