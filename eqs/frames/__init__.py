@@ -13,11 +13,13 @@ from eqs.frames.interpolation import (
 from eqs.frames.light import Light
 from eqs.frames.luma import GreyImage, luma
 from eqs.frames.order import by_name
+from eqs.frames.photocurrent import QUANTUM_EFFICIENCY, flat_response, photocurrent
 from eqs.frames.remapping import View, remapped
 from eqs.frames.video import VideoFile
 
 __all__ = [
     "IMAGE_SUFFIXES",
+    "QUANTUM_EFFICIENCY",
     "WHITE",
     "CachedInterpolation",
     "FlowInterpolation",
@@ -32,9 +34,11 @@ __all__ = [
     "by_name",
     "checked_frames",
     "checked_times",
+    "flat_response",
     "image_paths",
     "image_size",
     "luma",
+    "photocurrent",
     "read_image",
     "remapped",
 ]
