@@ -10,7 +10,7 @@ from eqs.frames.interpolation import (
     LinearInterpolation,
     NetworkInterpolation,
 )
-from eqs.frames.light import Light
+from eqs.frames.light import Light, linear_to_srgb
 from eqs.frames.luma import GreyImage, luma
 from eqs.frames.order import by_name
 from eqs.frames.photocurrent import QUANTUM_EFFICIENCY, flat_response, photocurrent
@@ -37,6 +37,7 @@ __all__ = [
     "flat_response",
     "image_paths",
     "image_size",
+    "linear_to_srgb",
     "luma",
     "photocurrent",
     "read_image",

@@ -18,6 +18,7 @@ from eqs.files import PARTIAL, one_at_a_time, read_json, write_json
 from eqs.processors import available_cores, side_by_side
 from eqs.scenes.camera import FrameCamera
 from eqs.scenes.labels import LabelRule
+from eqs.scenes.plan import Street
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.world import DrivingWorld
 
@@ -81,6 +82,21 @@ class SequencePlan:
         rng = np.random.default_rng(np.random.SeedSequence([*self.key, 1]))
         return int(rng.integers(40_000_000_000, 60_000_000_000))
 
+    @property
+    def duration_us(self) -> int:
+        """How long the event camera records."""
+        return LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
+
+    @property
+    def street(self) -> Street:
+        """The street it is recorded in."""
+        return Street(
+            seed=(*self.key, 0),
+            night=self.night,
+            still=self.still,
+            duration_s=1e-6 * self.duration_us,
+        )
+
     def description(self) -> dict[str, Any]:
         """What the files depend on, to recognise them again."""
         return {**asdict(self), "version": VERSION}
@@ -117,15 +133,8 @@ class SequencePlan:
         return record
 
     def _render(self, folder: Path) -> dict[str, Any]:
-        duration_us = LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
-        world = DrivingWorld(
-            height=self.height,
-            width=self.width,
-            seed=(*self.key, 0),
-            night=self.night,
-            still=self.still,
-            duration_s=1e-6 * duration_us,
-        )
+        duration_us = self.duration_us
+        world = DrivingWorld(height=self.height, width=self.width, **asdict(self.street))
         times = LEAD_IN_US + FRAME_PERIOD_US * np.arange(self.frames, dtype=np.int64)
         exposure_us = self._write_frames(folder, world, times)
         boxes = [self.rule.boxes(world.view(int(t)), int(t) + self.t_offset_us) for t in times]

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.scenes import street
+from eqs.scenes import street as draw
 from eqs.scenes.actors import Actor
 from eqs.scenes.paint_street import Surfaces
 from eqs.scenes.textures import (
@@ -24,6 +24,23 @@ from eqs.scenes.textures import (
 )
 
 TEXEL_M: Final = (0.03125, 0.125)  # finest and coarsest texture
+
+
+@dataclass(frozen=True, kw_only=True)
+class Street:
+    """What a street and the drive along it are drawn from.
+
+    Args:
+        seed: integers that name it.
+        night: street lamps, lit windows and headlights instead of daylight.
+        still: the camera waits instead of driving.
+        duration_s: for how long there shall be something to see.
+    """
+
+    seed: tuple[int, ...]
+    night: bool = False
+    still: bool = False
+    duration_s: float = 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,7 +61,7 @@ class StreetPlan:
 
     lighting: Lighting
     light: NDArray[np.float64]
-    drive: street.Drive
+    drive: draw.Drive
     left: Front
     right: Front
     ground: Ground
@@ -53,27 +70,18 @@ class StreetPlan:
     actors: list[Actor]
 
 
-def draw_plan(
-    seed: tuple[int, ...], *, width: int, night: bool, still: bool, duration_s: float
-) -> StreetPlan:
-    """Draw a street.
-
-    Args:
-        seed: integers that name it.
-        width: columns of the image, for the resolution of the textures.
-        night: street lamps, lit windows and headlights instead of daylight.
-        still: the camera waits instead of driving.
-        duration_s: for how long there shall be something to see.
-    """
-    rng = np.random.default_rng(np.random.SeedSequence(seed))
-    lighting = street.draw_lighting(rng, night=night)
-    light = street.light_vector(rng, lighting, night=night)
-    drive = street.draw_drive(rng, still=still)
+def draw_plan(street: Street, width: int) -> StreetPlan:
+    """Draw a street; the width of the image, in pixels, sets the resolution of the textures."""
+    rng = np.random.default_rng(np.random.SeedSequence(tuple(street.seed)))
+    night = street.night
+    lighting = draw.draw_lighting(rng, night=night)
+    light = draw.light_vector(rng, lighting, night=night)
+    drive = draw.draw_drive(rng, still=street.still)
     texel_m = float(np.clip(TEXEL_M[1] * 128.0 / width, *TEXEL_M))
     left, right = front(rng, lighting, texel_m), front(rng, lighting, texel_m)
     road = ground(rng, texel_m)
     sky = _draw_sky(rng, lighting, night=night)
-    way_m = drive.speed * duration_s
+    way_m = drive.speed * street.duration_s
     return StreetPlan(
         lighting=lighting,
         light=light,
@@ -84,10 +92,10 @@ def draw_plan(
         sky=sky,
         texel_m=texel_m,
         actors=[
-            *street.draw_furniture(rng, way_m + 80.0, night=night),
-            *street.draw_vehicles(rng, drive, way_m, night=night),
-            *street.draw_pedestrians(rng, way_m),
-            *street.draw_cyclists(rng, way_m, night=night),
+            *draw.draw_furniture(rng, way_m + 80.0, night=night),
+            *draw.draw_vehicles(rng, drive, way_m, night=night),
+            *draw.draw_pedestrians(rng, way_m),
+            *draw.draw_cyclists(rng, way_m, night=night),
         ],
     )
 

@@ -23,7 +23,7 @@ from eqs.scenes.optics import (
 from eqs.scenes.outline import outline_actors
 from eqs.scenes.paint_actors import measure_actors, paint_actors
 from eqs.scenes.paint_street import COLUMN_FACTS, paint_street
-from eqs.scenes.plan import draw_plan, painted_surfaces
+from eqs.scenes.plan import Street, draw_plan, painted_surfaces
 from eqs.scenes.polygons import Polygons
 
 FIELD_OF_VIEW_RAD = np.deg2rad(44.0)
@@ -81,7 +81,8 @@ class DrivingWorld:
     ) -> None:
         """Draw the street; rendering draws nothing any more."""
         self.height, self.width, self.night, self.still = height, width, night, still
-        plan = draw_plan(seed, width=width, night=night, still=still, duration_s=duration_s)
+        street = Street(seed=seed, night=night, still=still, duration_s=duration_s)
+        plan = draw_plan(street, width)
         self._light, self._drive, self.actors = plan.light, plan.drive, plan.actors
         self._surfaces = painted_surfaces(plan)
         self._rows = np.array([actor.row() for actor in self.actors])

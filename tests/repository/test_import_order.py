@@ -24,6 +24,7 @@ ROOMS = {
     "eqs.simulators.pixel": "frames processors simulators.streaming",
     "eqs.simulators": "events frames simulators.pixel simulators.streaming",
     "eqs.scenes": "events files processors",
+    "eqs.scenes.traced": "extras frames scenes",
     "eqs.data": "content events files frames processors simulators",
     "eqs.models": "",
     "eqs.metrics.baselines": "events metrics",
@@ -33,7 +34,7 @@ ROOMS = {
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
     "models names processors simulators study training",
     "eqs.benchmarks": "data events frames metrics models representations simulators training",
-    "eqs.commands": "benchmarks data drawing events extras files pipelines",
+    "eqs.commands": "benchmarks data drawing events extras files frames pipelines",
     "eqs.__main__": "commands",
 }
 # The published models: each builds on the simulator, its parts and the stream, and on no other.
