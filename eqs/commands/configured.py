@@ -77,6 +77,7 @@ CONFIGURED = {
     ),
     "prepare": Configured(config="prepare", module="prepare", pipeline="prepare"),
     "simulate": Configured(config="simulate", module="simulate", pipeline="simulate"),
+    "render": Configured(config="render", module="render", pipeline="render"),
     "score": Configured(
         config="score", module="score_files", pipeline="score_files", translate=with_files
     ),

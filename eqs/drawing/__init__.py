@@ -4,7 +4,9 @@ from eqs.drawing.curves import event_rate, learning_curves, rate_curves, score_c
 from eqs.drawing.film import (
     event_picture,
     event_pictures,
+    framed,
     histogram_picture,
+    picture_times,
     with_boxes,
     write_film,
 )
@@ -19,8 +21,10 @@ __all__ = [
     "event_pictures",
     "event_rate",
     "events_panels",
+    "framed",
     "histogram_picture",
     "learning_curves",
+    "picture_times",
     "rate_curves",
     "save_figure",
     "score_curve",

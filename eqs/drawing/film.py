@@ -60,13 +60,37 @@ def event_pictures(
     Raises:
         ValueError: the stretch of time is shorter than a window, or no picture is asked for.
     """
+    for end_us in picture_times(start_us, stop_us, window_us, pictures):
+        yield event_picture(reader.window(int(end_us) - window_us, int(end_us)))
+
+
+def picture_times(start_us: int, stop_us: int, window_us: int, pictures: int) -> NDArray[np.int64]:
+    """The instants of evenly spaced pictures, each of which looks back a window.
+
+    Raises:
+        ValueError: the stretch of time is shorter than a window, or no picture is asked for.
+    """
     if stop_us - start_us < window_us or window_us < 1 or pictures < 1:
         raise ValueError(
             f"Expected at least one picture and a stretch of at least a window of {window_us} us, "
             f"got {pictures} pictures of {stop_us - start_us} us"
         )
-    for end_us in np.linspace(start_us + window_us, stop_us, pictures).astype(np.int64):
-        yield event_picture(reader.window(int(end_us) - window_us, int(end_us)))
+    return np.linspace(start_us + window_us, stop_us, pictures).astype(np.int64)
+
+
+def framed(picture: Picture, frame: NDArray[np.uint8]) -> Picture:
+    """A video frame, grey or RGB, with the events of its instant below.
+
+    Raises:
+        ValueError: the two differ in size.
+    """
+    if frame.shape[:2] != picture.shape[:2]:
+        raise ValueError(
+            f"Expected frames as large as the sensor, {picture.shape[:2]}, got {frame.shape[:2]}; "
+            "name the folder that these events are of"
+        )
+    colour = frame if frame.ndim == 3 else np.repeat(frame[..., None], 3, axis=2)
+    return np.concatenate([colour, picture])
 
 
 def with_boxes(picture: Picture, boxes: Boxes, *, min_score: float = 0.3) -> Picture:

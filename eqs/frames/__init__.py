@@ -11,14 +11,16 @@ from eqs.frames.interpolation import (
     NetworkInterpolation,
 )
 from eqs.frames.lens import Lens
-from eqs.frames.light import Light, LightOfScenes, LightSource
+from eqs.frames.light import Light, LightOfScenes, LightSource, linear_to_srgb
 from eqs.frames.luma import GreyImage, luma
 from eqs.frames.order import by_name
+from eqs.frames.photocurrent import QUANTUM_EFFICIENCY, flat_response, photocurrent
 from eqs.frames.remapping import View, remapped
 from eqs.frames.video import VideoFile
 
 __all__ = [
     "IMAGE_SUFFIXES",
+    "QUANTUM_EFFICIENCY",
     "WHITE",
     "CachedInterpolation",
     "FlowInterpolation",
@@ -36,9 +38,12 @@ __all__ = [
     "by_name",
     "checked_frames",
     "checked_times",
+    "flat_response",
     "image_paths",
     "image_size",
+    "linear_to_srgb",
     "luma",
+    "photocurrent",
     "read_image",
     "remapped",
     "require_opaque",

@@ -37,6 +37,17 @@ def srgb_to_linear(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(values <= 0.04045, low, ((np.maximum(values, 0) + 0.055) / 1.055) ** 2.4)
 
 
+def linear_to_srgb(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """SRGB values of linear light, both in [0, 1]; what is brighter is cut off.
+
+    Example:
+        >>> linear_to_srgb(np.array([0.0, 0.214, 1.0])).round(3).tolist()
+        [0.0, 0.5, 1.0]
+    """
+    light = np.clip(values, 0.0, 1.0)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
+
+
 def gamma22_to_linear(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Linear light of values with an exponent of 1 / 2.2, both in [0, 1]."""
     return np.maximum(values, 0) ** 2.2

@@ -3,7 +3,9 @@
 from eqs.scenes.camera import Exposure, FrameCamera
 from eqs.scenes.generate import DSECMini, SequencePlan
 from eqs.scenes.labels import TRACK_DTYPE, LabelRule
+from eqs.scenes.plan import Street
 from eqs.scenes.scene_light import SceneLight
+from eqs.scenes.scenery import PaintedStreet, recorded_street
 from eqs.scenes.sensor import ReferenceSensor, ReferenceStream
 from eqs.scenes.world import ActorsInView, DrivingWorld
 
@@ -15,8 +17,11 @@ __all__ = [
     "Exposure",
     "FrameCamera",
     "LabelRule",
+    "PaintedStreet",
     "ReferenceSensor",
     "ReferenceStream",
     "SceneLight",
     "SequencePlan",
+    "Street",
+    "recorded_street",
 ]

@@ -19,6 +19,7 @@ from eqs.files import PARTIAL, one_at_a_time, read_json, write_json
 from eqs.processors import available_cores, side_by_side
 from eqs.scenes.camera import Exposure, FrameCamera
 from eqs.scenes.labels import LabelRule
+from eqs.scenes.plan import Street
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.world import DrivingWorld
 
@@ -82,6 +83,21 @@ class SequencePlan:
         rng = np.random.default_rng(np.random.SeedSequence([*self.key, 1]))
         return int(rng.integers(40_000_000_000, 60_000_000_000))
 
+    @property
+    def duration_us(self) -> int:
+        """How long the event camera records."""
+        return LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
+
+    @property
+    def street(self) -> Street:
+        """The street it is recorded in."""
+        return Street(
+            seed=(*self.key, 0),
+            night=self.night,
+            still=self.still,
+            duration_s=1e-6 * self.duration_us,
+        )
+
     def description(self) -> dict[str, Any]:
         """What the files depend on, to recognise them again."""
         return {**asdict(self), "version": VERSION}
@@ -94,25 +110,13 @@ class SequencePlan:
         return cls(**values | {name: kind(**values[name]) for name, kind in parts.items()})
 
     @property
-    def duration_us(self) -> int:
-        """How long the event camera watches."""
-        return LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
-
-    @property
     def frame_times_us(self) -> NDArray[np.int64]:
         """When frames are taken, from when the event camera was switched on."""
         return LEAD_IN_US + FRAME_PERIOD_US * np.arange(self.frames, dtype=np.int64)
 
     def world(self) -> DrivingWorld:
         """What both cameras see."""
-        return DrivingWorld(
-            height=self.height,
-            width=self.width,
-            seed=(*self.key, 0),
-            night=self.night,
-            still=self.still,
-            duration_s=1e-6 * self.duration_us,
-        )
+        return DrivingWorld(height=self.height, width=self.width, **asdict(self.street))
 
     def exposure(self, world: DrivingWorld) -> Exposure:
         """What the frame camera chooses for the recording, by the light in its middle."""

@@ -9,7 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.kernels import njit
-from eqs.scenes.actors import (
+from eqs.scenes.light import HAZE, HAZE_REACH, Lit, face_light, local_light
+from eqs.scenes.optics import (
+    CAM_COS,
+    CAM_SIN,
+    CAM_X,
+    CAM_Z,
+    FOCAL,
+    MID_COLUMN,
+    Array,
+    convex_hull,
+    project,
+    signed_area,
+)
+from eqs.scenes.parts import (
     ALBEDO,
     ANY,
     ATOP,
@@ -36,19 +49,6 @@ from eqs.scenes.actors import (
     WHEEL,
     X,
     Z,
-)
-from eqs.scenes.light import HAZE, HAZE_REACH, Lit, face_light, local_light
-from eqs.scenes.optics import (
-    CAM_COS,
-    CAM_SIN,
-    CAM_X,
-    CAM_Z,
-    FOCAL,
-    MID_COLUMN,
-    Array,
-    convex_hull,
-    project,
-    signed_area,
 )
 from eqs.scenes.polygons import CORNERS, Polygons, store
 

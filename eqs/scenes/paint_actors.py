@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from eqs.kernels import njit
-from eqs.scenes.actors import ATOP, SHADOW, SOLID
 from eqs.scenes.optics import Array, coverage
 from eqs.scenes.paint_street import Picture
+from eqs.scenes.parts import ATOP, SHADOW, SOLID
 from eqs.scenes.polygons import COLOUR, EDGES, JOIN, RING, STRENGTH, X0, X1, Y0, Y1, Polygons
 
 Span = tuple[int, int]

@@ -56,7 +56,7 @@ class ReferenceSensor:
         seed: draws the fixed pattern of mismatch; one seed is one sensor.
 
     Source: circuit and its constants as in the linear analysis of the DVS128 pixel (Lichtsteiner
-    et al. 2008) used by Low and Lee 2024; configs/scene/reference_sensor.yaml says where every
+    et al. 2008) used by Low and Lee 2024; configs/sensor/reference_sensor.yaml says where every
     number comes from.
     """
 

@@ -1,4 +1,4 @@
-"""Draws one street: its light, its surfaces, its traffic and the way the camera drives."""
+"""Draws one street: its light, its traffic and the way the camera drives."""
 
 from __future__ import annotations
 
@@ -22,16 +22,7 @@ from eqs.scenes.light import (
     SUN_X,
     SUN_Z,
 )
-from eqs.scenes.paint_street import Surfaces
-from eqs.scenes.textures import (
-    HALF_STREET_M,
-    KERB_M,
-    LAMP_SPACING_M,
-    Lighting,
-    front,
-    ground,
-    integrate,
-)
+from eqs.scenes.textures import HALF_STREET_M, KERB_M, LAMP_SPACING_M, Lighting
 
 LANE_M: Final = 1.9
 PARKING_M: Final = 5.1
@@ -140,28 +131,6 @@ def light_vector(
     light[HAZE] = 0.03 * lighting.ambient_lux if night else 0.55 * lighting.ambient_lux
     light[HAZE_REACH] = rng.uniform(180.0, 400.0)
     return light
-
-
-def draw_surfaces(
-    rng: np.random.Generator, lighting: Lighting, texel_m: float, *, night: bool
-) -> Surfaces:
-    """Both fronts, the ground and the sky."""
-    left, left_roofs = front(rng, lighting, -1.0, texel_m)
-    right, right_roofs = front(rng, lighting, 1.0, texel_m)
-    road = ground(rng, lighting, texel_m, (left_roofs, right_roofs))
-    sky = lighting.ambient_lux * (0.15 if night else rng.uniform(0.7, 1.3))
-    roofs = np.zeros((len(left_roofs) + 1, 2))
-    roofs[1:] = np.cumsum(np.stack([left_roofs, right_roofs], axis=1), axis=0) / texel_m
-    contrast = 0.05 if night else rng.uniform(0.05, 0.2)
-    return Surfaces(
-        road=integrate(road.T),
-        left=integrate(left.T),
-        right=integrate(right.T),
-        roofs=roofs,
-        sky=np.array([1.2 * sky, 0.8 * sky, contrast]),
-        texels_per_m=1.0 / texel_m,
-        half_street_m=HALF_STREET_M,
-    )
 
 
 def _paint(rng: np.random.Generator, *, dark: float = 0.04, bright: float = 0.8) -> float:

@@ -1,4 +1,4 @@
-"""Textures of the procedural street: building fronts and ground, as maps of radiance in lux."""
+"""Textures of the procedural street: what building fronts and ground are, and how they are lit."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ FRONT_M: Final = 16.0
 FLOOR_M: Final = 3.2
 HALF_STREET_M: Final = 10.0
 KERB_M: Final = 6.2
+HEDGE_M: Final = 3.5  # nothing lower is a building
 LAMP_SPACING_M: Final = 24.0
 
 
@@ -36,6 +37,36 @@ class Lighting:
     sun_side: float
     lamp_lux: float
     window_lux: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Front:
+    """One side of the street before light falls on it, in texels over (height, z).
+
+    Args:
+        albedo: share of the light that comes back.
+        glow: radiance of lit windows, lux.
+        glass: where there are windows.
+        roofs: height of the building in metres over z.
+    """
+
+    albedo: Map
+    glow: Map
+    glass: Mask
+    roofs: Map
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ground:
+    """Road and pavements before light falls on them, in texels over (x, z).
+
+    Args:
+        albedo: share of the light that comes back.
+        white: where there is white paint.
+    """
+
+    albedo: Map
+    white: Mask
 
 
 def integrate(texture: Map) -> NDArray[np.float64]:
@@ -71,14 +102,14 @@ def _cells(extent_m: tuple[float, float], texel_m: float) -> slice:
 
 def _paint_windows(
     rng: np.random.Generator,
-    albedo: Map,
-    glow: Map,
+    wall: Front,
     extent_m: tuple[float, float],
     texel_m: float,
     roof_m: float,
     lit: float,
 ) -> None:
     """Add a grid of windows, some of them lit, to one building."""
+    albedo = wall.albedo
     pitch = rng.uniform(2.4, 4.2)
     wide, tall = rng.uniform(0.45, 0.65) * pitch, rng.uniform(1.3, 2.0)
     sill = rng.uniform(0.7, 1.1)
@@ -92,24 +123,21 @@ def _paint_windows(
         while at + wide < last - 0.3:
             z = _cells((at, at + wide), texel_m)
             albedo[y, z] = glass
+            wall.glass[y, z] = True
             if rng.random() < (0.7 if shop else 0.3):
-                glow[y, z] = lit * rng.uniform(0.2, 1.0) * (1.5 if shop else 1.0)
+                wall.glow[y, z] = lit * rng.uniform(0.2, 1.0) * (1.5 if shop else 1.0)
             at += pitch
         ledge = round(floor * FLOOR_M / texel_m)
         albedo[ledge : ledge + max(1, round(0.2 / texel_m)), columns] *= rng.choice([0.7, 1.3])
 
 
-def front(
-    rng: np.random.Generator, lighting: Lighting, side: float, texel_m: float
-) -> tuple[Map, Map]:
-    """One side of the street.
-
-    Returns:
-        Radiance over (height, z) and roof height over z, in texels of `texel_m`.
-    """
+def front(rng: np.random.Generator, lighting: Lighting, texel_m: float) -> Front:
+    """One side of the street, in texels of `texel_m`."""
     length, rows = round(PERIOD_M / texel_m), round(FRONT_M / texel_m)
-    albedo, glow = np.full((rows, length), 0.3), np.zeros((rows, length))
+    albedo = np.full((rows, length), 0.3)
+    glass = np.zeros((rows, length), np.bool_)
     roofs = np.zeros(length)
+    wall = Front(albedo=albedo, glow=np.zeros((rows, length)), glass=glass, roofs=roofs)
     start = 0.0
     while start < PERIOD_M:
         stop = start + rng.uniform(6.0, 16.0)
@@ -117,23 +145,30 @@ def front(
             stop = PERIOD_M
         columns = _cells((start, stop), texel_m)
         if rng.random() < 0.14:  # a garden wall or hedge between two buildings
-            roof = rng.uniform(2.0, 3.5)
+            roof = rng.uniform(2.0, HEDGE_M)
             albedo[:, columns] = rng.uniform(0.05, 0.12)
         else:
             roof = rng.uniform(6.5, FRONT_M - 1.0)
             albedo[:, columns] = np.exp(rng.uniform(np.log(0.2), np.log(0.4)))
             if rng.random() < 0.15:  # few: a detector has minutes to learn what is no object
-                _paint_windows(rng, albedo, glow, (start, stop), texel_m, roof, lighting.window_lux)
+                _paint_windows(rng, wall, (start, stop), texel_m, roof, lighting.window_lux)
         roofs[columns] = roof
         edge = max(1, round(0.25 / texel_m))
         albedo[:, columns.start : columns.start + edge] *= 0.8
         start = stop
     albedo *= mottle(rng, albedo.shape, texel_m, 0.1)
+    return wall
+
+
+def front_radiance(wall: Front, lighting: Lighting, side: float, texel_m: float) -> Map:
+    """A lit front, radiance in lux over (height, z); `side` is -1 for the left one."""
+    rows, length = wall.albedo.shape
     height = (np.arange(rows)[:, None] + 0.5) * texel_m
-    light = np.full(albedo.shape, lighting.ambient_lux)
+    light = np.full(wall.albedo.shape, lighting.ambient_lux)
     light += lighting.sun_lux * 0.7 * (side == lighting.sun_side)
     light += lighting.lamp_lux * 0.6 * lamp_pools(texel_m, length) * np.exp(-((height / 6.0) ** 2))
-    return albedo * light + glow, roofs
+    radiance: Map = wall.albedo * light + wall.glow
+    return radiance
 
 
 def _markings(rng: np.random.Generator, x: Map, z: Map) -> tuple[Mask, Mask]:
@@ -147,12 +182,10 @@ def _markings(rng: np.random.Generator, x: Map, z: Map) -> tuple[Mask, Mask]:
     return dashed | parking | zebra | kerb, slab
 
 
-def ground(
-    rng: np.random.Generator, lighting: Lighting, texel_m: float, roofs: tuple[Map, Map]
-) -> Map:
-    """Road and pavements, radiance over (x, z)."""
+def ground(rng: np.random.Generator, texel_m: float) -> Ground:
+    """Road and pavements, in texels of `texel_m`."""
     length, rows = round(PERIOD_M / texel_m), round(2.0 * HALF_STREET_M / texel_m)
-    x = ((np.arange(rows) + 0.5) * texel_m - HALF_STREET_M)[:, None]
+    x = _across(rows, texel_m)
     z = ((np.arange(length) + 0.5) * texel_m)[None]
     asphalt, paving = rng.uniform(0.07, 0.13), rng.uniform(0.2, 0.32)
     albedo = np.where(np.abs(x) < KERB_M, asphalt, paving) * np.ones_like(z)
@@ -165,10 +198,24 @@ def ground(
         inside = (np.abs(x - at_x) < long_x) & (np.abs(z - at_z) < 2.0 * long_z)
         albedo[inside] *= rng.choice([0.5, 0.65, 1.5])
     albedo[white] = 0.55 * mottle(rng, albedo.shape, texel_m, 0.08)[white]
+    return Ground(albedo=albedo, white=white)
+
+
+def ground_radiance(
+    road: Ground, lighting: Lighting, texel_m: float, roofs: tuple[Map, Map]
+) -> Map:
+    """Lit road and pavements, radiance in lux over (x, z); `roofs` are those left and right."""
+    rows, length = road.albedo.shape
     # The sunny side's houses do not shade the road, those of the other side do.
     shading = roofs[0] if lighting.sun_side > 0 else roofs[1]
     edge = -HALF_STREET_M + 0.95 * shading[None]
-    sunny = (x * np.sign(lighting.sun_side)) > edge
+    sunny = (_across(rows, texel_m) * np.sign(lighting.sun_side)) > edge
     light = lighting.ambient_lux + lighting.sun_lux * sunny
-    radiance: Map = albedo * (light + lighting.lamp_lux * lamp_pools(texel_m, length)[None])
+    radiance: Map = road.albedo * (light + lighting.lamp_lux * lamp_pools(texel_m, length)[None])
     return radiance
+
+
+def _across(rows: int, texel_m: float) -> Map:
+    """Metres right of the middle of the street, shape (rows, 1)."""
+    x: Map = ((np.arange(rows) + 0.5) * texel_m - HALF_STREET_M)[:, None]
+    return x

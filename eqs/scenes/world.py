@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.scenes import street
 from eqs.scenes.optics import (
     CAM_COS,
     CAM_PITCH,
@@ -24,6 +23,7 @@ from eqs.scenes.optics import (
 from eqs.scenes.outline import outline_actors
 from eqs.scenes.paint_actors import measure_actors, paint_actors
 from eqs.scenes.paint_street import COLUMN_FACTS, paint_street
+from eqs.scenes.plan import Street, draw_plan, painted_surfaces
 from eqs.scenes.polygons import Polygons
 
 FIELD_OF_VIEW_RAD = np.deg2rad(44.0)
@@ -81,19 +81,10 @@ class DrivingWorld:
     ) -> None:
         """Draw the street; rendering draws nothing any more."""
         self.height, self.width, self.night, self.still = height, width, night, still
-        rng = np.random.default_rng(np.random.SeedSequence(seed))
-        lighting = street.draw_lighting(rng, night=night)
-        self._light = street.light_vector(rng, lighting, night=night)
-        self._drive = street.draw_drive(rng, still=still)
-        texel_m = float(np.clip(0.125 * 128.0 / width, 0.03125, 0.125))
-        self._surfaces = street.draw_surfaces(rng, lighting, texel_m, night=night)
-        way_m = self._drive.speed * duration_s
-        self.actors = [
-            *street.draw_furniture(rng, way_m + 80.0, night=night),
-            *street.draw_vehicles(rng, self._drive, way_m, night=night),
-            *street.draw_pedestrians(rng, way_m),
-            *street.draw_cyclists(rng, way_m, night=night),
-        ]
+        street = Street(seed=seed, night=night, still=still, duration_s=duration_s)
+        plan = draw_plan(street, width)
+        self._light, self._drive, self.actors = plan.light, plan.drive, plan.actors
+        self._surfaces = painted_surfaces(plan)
         self._rows = np.array([actor.row() for actor in self.actors])
         self._parts = np.concatenate([actor.parts for actor in self.actors])
         self._first = np.cumsum([0] + [len(actor.parts) for actor in self.actors])

@@ -30,6 +30,7 @@ ROOMS = {
     "eqs.simulators.learned": "files frames kernels models simulators simulators.pixel "
     "simulators.streaming",
     "eqs.scenes": "events files frames processors kernels",
+    "eqs.scenes.traced": "extras frames scenes",
     "eqs.data": "content events files frames processors simulators",
     "eqs.models": "kernels",
     "eqs.metrics.baselines": "events metrics",
@@ -41,7 +42,7 @@ ROOMS = {
     "models names processors simulators simulators.learned study training",
     "eqs.benchmarks": "data events extras frames metrics models representations scenes simulators "
     "simulators.learned training",
-    "eqs.commands": "benchmarks data drawing events extras files frames.networks pipelines",
+    "eqs.commands": "benchmarks data drawing events extras files frames frames.networks pipelines",
     "eqs.__main__": "commands",
 }
 # The published models: each builds on the simulator, its parts and the stream, and on no other.

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from eqs.scenes.actors import SOLID
 from eqs.scenes.optics import convex_hull, coverage, project, set_edges, signed_area
 from eqs.scenes.paint_actors import _paint_actor
+from eqs.scenes.parts import SOLID
 from eqs.scenes.polygons import EDGES, JOIN, X0, X1, Y0, Y1, Polygons
 
 

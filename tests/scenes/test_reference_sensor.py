@@ -24,7 +24,7 @@ QUIET = ReferenceSensor(
     jitter_us=0.0,
     row_service_us=0.0,
 )
-CONFIG = Path(__file__).parents[2] / "eqs/configs/scene/reference_sensor.yaml"
+CONFIG = Path(__file__).parents[2] / "eqs/configs/sensor/reference_sensor.yaml"
 
 
 def record(sensor, pictures, *, groups=None, start_us=0, key=(1,)):
