@@ -9,7 +9,7 @@ from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
 from eqs import simulators
-from eqs.frames import GreyImage, Light
+from eqs.frames import GreyImage, Light, linear_to_srgb
 from eqs.pipelines.resolvers import register_resolvers
 from eqs.scenes.camera import tone_curve
 from eqs.simulators import ADV2E, ESIM, PECS, DVSPixel, Simulator, VolumeNetwork
@@ -27,6 +27,12 @@ def test_the_curve_undoes_that_of_the_rendered_camera():
     light = np.linspace(0, 1, 1001)
     display = 255 * tone_curve(light)
     assert np.abs(Light().levels(display) / 255 - light).max() < 1e-12
+
+
+def test_there_and_back_is_the_same_light():
+    light = np.linspace(0, 1, 1001)
+    assert linear_to_srgb(light) == pytest.approx(tone_curve(light), abs=1e-12)
+    assert Light().levels(255 * linear_to_srgb(light)) / 255 == pytest.approx(light, abs=1e-12)
 
 
 def test_gamma_and_black_level():

@@ -40,7 +40,7 @@ Row = NDArray[np.float64]
 
 PANE_INSET: Final = 0.18  # as the painter has it
 STAND_OUT_M: Final = 0.006
-ROUND: Final = 16  # corners of a disc
+ROUND: Final = 32  # corners of a disc
 SIGNS: Final = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)  # right, forward
 QUAD: Final = np.array([[0, 1, 2], [0, 2, 3]])
 
@@ -196,7 +196,7 @@ def _circle() -> tuple[Points, Points]:
     return np.sin(angle), np.cos(angle)
 
 
-def _sphere(rings: int = 8) -> Solid:
+def _sphere(rings: int = 16) -> Solid:
     """A unit sphere of rings of triangles."""
     polar = np.pi * np.arange(rings + 1) / rings
     turn = 2.0 * np.pi * np.arange(ROUND) / ROUND

@@ -45,7 +45,7 @@ def test_a_ball_has_nearly_a_sphere_s_volume():
     assert radius == pytest.approx(np.full(len(radius), 0.5))
     a, b, c = (centred.points[centred.triangles[:, k]] for k in range(3))
     pieces = np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))).sum() / 6
-    assert pieces == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=0.07)
+    assert pieces == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=0.02)
 
 
 def test_heading_and_speed_move_an_actor():

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from eqs.extras import lacking
 from eqs.frames import QUANTUM_EFFICIENCY
 from eqs.scenes import recorded_street
 from eqs.simulators import ESIM
@@ -185,8 +184,3 @@ def test_a_moving_camera_flickers_less_with_one_noise_seed():
 def test_counts_below_one_are_refused():
     with pytest.raises(ValueError, match=r"set scene\.samples_per_pixel"):
         TracedStreet(height=4, width=4, samples_per_pixel=0, seed=(1,))
-
-
-def test_who_lacks_the_tracer_is_told_how_to_get_it():
-    error = ModuleNotFoundError("No module named 'mitsuba'", name="mitsuba")
-    assert lacking(error, "traced", "to trace rays").endswith("event-quality-score[traced]'")
