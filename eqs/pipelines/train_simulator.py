@@ -129,7 +129,7 @@ def learn_fold(job: Fold) -> tuple[int, dict[str, float]]:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     quiet_libraries()
     done = job.folder / "done.json"
-    if not done.is_file():
+    if not (done.is_file() and job.learning.weights(job.number).is_file()):
         task = VolumeTask(job.learning, job.number)
         trainer = trainer_of(job)
         train, val = loaders(job)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from eqs.files import read_json
 from eqs.frames import GreyImage
-from eqs.scenes.generate import RECORD, VERSION, SequencePlan
+from eqs.scenes.sequence import RECORD, VERSION, SequencePlan
 
 HEADROOM = 2.0
 """Light up to this many times the camera's white is seen; what is brighter counts as that."""

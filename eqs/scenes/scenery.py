@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.scenes.generate import SPLITS, VERSION, SequencePlan
 from eqs.scenes.plan import Street
 from eqs.scenes.sensor import ReferenceSensor
+from eqs.scenes.sequence import SPLITS, VERSION, SequencePlan
 from eqs.scenes.world import DrivingWorld
 
 FRAMES: Final = 60  # of a recording of dsec_mini
@@ -42,35 +42,11 @@ def recorded_street(split: str, index: int, seed: int = 0) -> Street:
     return recording.street
 
 
-class PaintedStreet:
-    """A street as `dsec_mini` shows it: grey, with all surfaces lit once and for all.
-
-    Args:
-        height: rows of the image.
-        width: columns of the image.
-        seed: integers that name the street.
-        night: street lamps, lit windows and headlights instead of daylight.
-        still: the camera waits instead of driving.
-        duration_s: for how long there shall be something to see.
-    """
+class PaintedStreet(DrivingWorld):
+    """A street as `dsec_mini` shows it: grey, with all surfaces lit once and for all."""
 
     version = f"painted {VERSION}"
 
-    def __init__(
-        self,
-        *,
-        height: int,
-        width: int,
-        seed: tuple[int, ...],
-        night: bool = False,
-        still: bool = False,
-        duration_s: float = 3.0,
-    ) -> None:
-        """Draw the street."""
-        self.world = DrivingWorld(
-            height=height, width=width, seed=seed, night=night, still=still, duration_s=duration_s
-        )
-
     def photocurrent(self, t_us: float) -> NDArray[np.float32]:
         """Light in lux at `t_us` microseconds since the start, (H, W); grey has no colour."""
-        return self.world.radiance(t_us)
+        return self.radiance(t_us)

@@ -1,0 +1,212 @@
+"""One rendered recording of `dsec_mini`, in the layout of DSEC and DSEC-Detection."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from eqs.events.writer import EventWriter
+from eqs.files import PARTIAL, read_json, write_json
+from eqs.scenes.camera import Exposure, FrameCamera
+from eqs.scenes.labels import LabelRule
+from eqs.scenes.plan import Street
+from eqs.scenes.sensor import ReferenceSensor
+from eqs.scenes.world import DrivingWorld
+
+VERSION: Final = 11  # raise it whenever the same parameters give other files
+FRAME_PERIOD_US: Final = 50_000
+LEAD_IN_US: Final = 60_000  # events before the first frame
+LEAD_OUT_US: Final = 10_000  # and after the last one
+SPLITS: Final = {"train": 0, "val": 1, "test": 2}
+RECORD: Final = "sequence.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SequencePlan:
+    """One sequence to render: everything its files depend on.
+
+    Args:
+        split: train, val or test.
+        index: number within the split.
+        height: rows of both cameras.
+        width: columns of both cameras.
+        frames: number of frames, 20 per second.
+        seed: seed of the data set.
+        sensor: the reference event camera.
+        camera: the frame camera.
+        rule: which actors are labelled.
+    """
+
+    split: str
+    index: int
+    height: int
+    width: int
+    frames: int
+    seed: int
+    sensor: ReferenceSensor
+    camera: FrameCamera = field(default_factory=FrameCamera)
+    rule: LabelRule = field(default_factory=LabelRule)
+
+    @property
+    def night(self) -> bool:
+        """Every fifth recording."""
+        return self.index % 5 == 1
+
+    @property
+    def still(self) -> bool:
+        """Every twentieth recording is made while waiting, where little but traffic shows."""
+        return self.index % 20 == 17
+
+    @property
+    def name(self) -> str:
+        """Folder name."""
+        return f"mini_{self.split}_{self.index:03d}_{'night' if self.night else 'day'}"
+
+    @property
+    def key(self) -> tuple[int, int, int]:
+        """Integers from which all of the recording's randomness is drawn."""
+        return (self.seed, SPLITS[self.split], self.index)
+
+    @property
+    def t_offset_us(self) -> int:
+        """When the event camera was switched on, on the recording's own clock."""
+        rng = np.random.default_rng(np.random.SeedSequence([*self.key, 1]))
+        return int(rng.integers(40_000_000_000, 60_000_000_000))
+
+    @property
+    def duration_us(self) -> int:
+        """How long the event camera records."""
+        return LEAD_IN_US + (self.frames - 1) * FRAME_PERIOD_US + LEAD_OUT_US
+
+    @property
+    def street(self) -> Street:
+        """The street it is recorded in."""
+        return Street(
+            seed=(*self.key, 0),
+            night=self.night,
+            still=self.still,
+            duration_s=1e-6 * self.duration_us,
+        )
+
+    def description(self) -> dict[str, Any]:
+        """What the files depend on, to recognise them again."""
+        return {**asdict(self), "version": VERSION}
+
+    @classmethod
+    def of(cls, description: Mapping[str, Any]) -> SequencePlan:
+        """The plan that a description of this version was made of."""
+        values = {name: value for name, value in description.items() if name != "version"}
+        parts = {"sensor": ReferenceSensor, "camera": FrameCamera, "rule": LabelRule}
+        return cls(**values | {name: kind(**values[name]) for name, kind in parts.items()})
+
+    @property
+    def frame_times_us(self) -> NDArray[np.int64]:
+        """When frames are taken, from when the event camera was switched on."""
+        return LEAD_IN_US + FRAME_PERIOD_US * np.arange(self.frames, dtype=np.int64)
+
+    def world(self) -> DrivingWorld:
+        """What both cameras see."""
+        return DrivingWorld(height=self.height, width=self.width, **asdict(self.street))
+
+    def exposure(self, world: DrivingWorld) -> Exposure:
+        """What the frame camera chooses for the recording, by the light in its middle."""
+        middle = self.frame_times_us[self.frames // 2]
+        return self.camera.meter(world.radiance(float(middle)))
+
+    def write(self, root: Path) -> dict[str, Any]:
+        """Render into `root/split/name`, which appears when it is complete.
+
+        A folder that was completed earlier with the same description is kept as it is.
+
+        Returns:
+            The sequence's record: counts and description.
+
+        Raises:
+            ValueError: a folder of that name is there, which was not written here.
+        """
+        folder = root / self.split / self.name
+        if (folder / RECORD).is_file():
+            record = read_json(folder / RECORD)
+            if record["description"] == self.description():
+                return record
+        elif folder.exists():
+            raise ValueError(
+                f"Expected no folder at {folder} but those written here, got another; set "
+                "data.root to a new folder"
+            )
+        partial = folder.with_name(folder.name + PARTIAL)
+        for old in (partial, folder):
+            if old.exists():
+                shutil.rmtree(old)
+        partial.mkdir(parents=True)
+        record = self._render(partial)
+        write_json(partial / RECORD, record)
+        partial.replace(folder)
+        return record
+
+    def _render(self, folder: Path) -> dict[str, Any]:
+        world, times, duration_us = self.world(), self.frame_times_us, self.duration_us
+        exposure_us = self._write_frames(folder, world, times)
+        boxes = [self.rule.boxes(world.view(int(t)), int(t) + self.t_offset_us) for t in times]
+        (folder / "object_detections/left").mkdir(parents=True)
+        tracks = np.concatenate(boxes)
+        np.save(folder / "object_detections/left/tracks.npy", tracks)
+        events, on = self._write_events(folder, world, duration_us)
+        classes, counts = np.unique(tracks["class_id"], return_counts=True)
+        return {
+            "name": self.name,
+            "frames": self.frames,
+            "duration_us": duration_us,
+            "exposure_us": exposure_us,
+            "events": events,
+            "on_events": on,
+            "boxes": {str(c): int(n) for c, n in zip(classes, counts, strict=True)},
+            "occluded_boxes": int((tracks["visibility"] < 0.9).sum()),
+            "description": self.description(),
+        }
+
+    def _write_frames(self, folder: Path, world: DrivingWorld, times: np.ndarray) -> int:
+        pictures = folder / "images/left/distorted"
+        pictures.mkdir(parents=True)
+        exposure = self.exposure(world)
+        for k, t in enumerate(times):
+            frame = self.camera.expose(world.radiance, int(t), exposure, (*self.key, 2, k))
+            Image.fromarray(frame).save(pictures / f"{k:06d}.png")
+        stamps = times + self.t_offset_us
+        half = exposure.time_us // 2
+        lines = "".join(f"{t}\n" for t in stamps)
+        (folder / "images/timestamps.txt").write_text(lines)
+        spans = "".join(f"{t - half}, {t + half}\n" for t in stamps)
+        (folder / "images/left/exposure_timestamps.txt").write_text(
+            "# exposure start, exposure end\n" + spans
+        )
+        return exposure.time_us
+
+    def _write_events(self, folder: Path, world: DrivingWorld, duration_us: int) -> tuple[int, int]:
+        (folder / "events/left").mkdir(parents=True)
+        stream = self.sensor.start(
+            self.height, self.width, noise_key=(*self.key, 3), start_us=self.t_offset_us
+        )
+        instants = range(0, duration_us + 1, self.sensor.step_us)
+        total = on = 0
+        with EventWriter(
+            folder / "events/left/events.h5",
+            self.height,
+            self.width,
+            t_offset_us=self.t_offset_us,
+        ) as writer:
+            for first in range(0, len(instants), 50):
+                part = np.stack([world.radiance(t) for t in instants[first : first + 50]])
+                events = stream.step(part)
+                writer.append(events)
+                total, on = total + len(events), on + int(events.p.sum())
+            events = stream.finish()
+            writer.append(events)
+        return total + len(events), on + int(events.p.sum())
