@@ -1,12 +1,14 @@
 """The procedural driving world and the two cameras that make `dsec_mini`."""
 
 from eqs.scenes.camera import Exposure, FrameCamera
+from eqs.scenes.first_order import FirstOrderSensor
 from eqs.scenes.generate import DSECMini
 from eqs.scenes.labels import TRACK_DTYPE, LabelRule
 from eqs.scenes.plan import Street
 from eqs.scenes.scene_light import SceneLight
 from eqs.scenes.scenery import PaintedStreet, recorded_street
 from eqs.scenes.sensor import ReferenceSensor, ReferenceStream
+from eqs.scenes.sensor_stream import EventSensor, SensorStream
 from eqs.scenes.sequence import SequencePlan
 from eqs.scenes.world import ActorsInView, DrivingWorld
 
@@ -15,13 +17,16 @@ __all__ = [
     "ActorsInView",
     "DSECMini",
     "DrivingWorld",
+    "EventSensor",
     "Exposure",
+    "FirstOrderSensor",
     "FrameCamera",
     "LabelRule",
     "PaintedStreet",
     "ReferenceSensor",
     "ReferenceStream",
     "SceneLight",
+    "SensorStream",
     "SequencePlan",
     "Street",
     "recorded_street",

@@ -16,6 +16,7 @@ from eqs.processors import available_cores, side_by_side
 from eqs.scenes.camera import FrameCamera
 from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
+from eqs.scenes.sensor_stream import EventSensor
 from eqs.scenes.sequence import RECORD, SPLITS, VERSION, SequencePlan
 
 
@@ -28,7 +29,7 @@ class DSECMini:
         sequences: number of recordings per split.
         frames: frames per recording, 20 per second.
         seed: draws every recording; one seed is one data set, whatever the worker count.
-        sensor: the reference event camera.
+        sensor: the event camera.
         workers: processes; None for one per core.
 
     Raises:
@@ -39,7 +40,7 @@ class DSECMini:
     sequences: Mapping[str, int]
     frames: int = 60
     seed: int = 0
-    sensor: ReferenceSensor = field(default_factory=ReferenceSensor)
+    sensor: EventSensor = field(default_factory=ReferenceSensor)
     workers: int | None = None
 
     def __post_init__(self) -> None:
@@ -60,7 +61,7 @@ class DSECMini:
 
     @property
     def sensor_hash(self) -> str:
-        """Hash of the reference sensor's parameters."""
+        """Hash of the event camera's parameters."""
         return self.sensor.definition_hash()
 
     def recordings(self) -> list[SequencePlan]:

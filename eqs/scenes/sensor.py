@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from eqs.events import Events
-from eqs.scenes.circuit import Array, Circuit, advance, read_out
+from eqs.scenes.circuit import Array, Circuit, advance
+from eqs.scenes.sensor_stream import EventSensor, SensorStream
 
 ELECTRON_C = 1.602176634e-19
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReferenceSensor:
+class ReferenceSensor(EventSensor):
     """Parameters of the reference event camera, and nothing else.
 
     A photodiode with dark current drives a logarithmic photoreceptor of second order whose
@@ -52,8 +50,6 @@ class ReferenceSensor:
         latency_us: delay of comparator and handshake, us.
         jitter_us: standard deviation of that delay, us.
         row_service_us: time the readout spends on one row, us.
-        step_us: time between two renderings of the scene, us.
-        seed: draws the fixed pattern of mismatch; one seed is one sensor.
 
     Source: circuit and its constants as in the linear analysis of the DVS128 pixel (Lichtsteiner
     et al. 2008) used by Low and Lee 2024; configs/sensor/reference_sensor.yaml says where every
@@ -81,22 +77,10 @@ class ReferenceSensor:
     latency_us: float = 40.0
     jitter_us: float = 20.0
     row_service_us: float = 0.2
-    step_us: int = 1000
-    seed: int = 0
 
     def __post_init__(self) -> None:
         """Refuse values the circuit cannot have."""
-        for name, value in asdict(self).items():
-            if not value >= 0:
-                raise ValueError(f"Expected {name} >= 0, got {value}; set scene.sensor.{name}")
-        for name in ("threshold_on_log", "threshold_off_log", "dark_current_fa", "step_us"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"Expected {name} > 0, got 0; set scene.sensor.{name}")
-
-    def definition_hash(self) -> str:
-        """Twelve hexadecimal digits that change with any parameter."""
-        text = json.dumps(asdict(self), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
+        self.require("threshold_on_log", "threshold_off_log", "dark_current_fa", "step_us")
 
     def start(
         self, height: int, width: int, *, noise_key: tuple[int, ...], start_us: int = 0
@@ -126,12 +110,10 @@ class ReferenceSensor:
         )
 
 
-class ReferenceStream:
-    """One recording of a `ReferenceSensor`: the state of every pixel and of the readout.
+class ReferenceStream(SensorStream):
+    """One recording of a `ReferenceSensor`.
 
-    Convention: picture k of a recording is the light at `start_us + k step_us`; between two
-    pictures the photoreceptor's output runs straight. Feeding the pictures one by one or in any
-    groups gives the same events.
+    Convention: between two pictures the photoreceptor's output runs straight.
     """
 
     def __init__(
@@ -143,9 +125,17 @@ class ReferenceStream:
         noise_key: tuple[int, ...],
         start_us: int,
     ) -> None:
-        """Draw the sensor's fixed pattern; the first picture settles the pixels."""
-        self._sensor, self._circuit = sensor, sensor.circuit()
-        self._height, self._width, self._start_us = height, width, start_us
+        """Draw the sensor's fixed pattern."""
+        # A pixel remembers its output, the slope per second, the memorised value, refractory us.
+        super().__init__(
+            height,
+            width,
+            rows=4,
+            step_us=sensor.step_us,
+            row_service_us=sensor.row_service_us,
+            start_us=start_us,
+        )
+        self._circuit = sensor.circuit()
         count = height * width
         pattern = np.random.default_rng(np.random.SeedSequence([sensor.seed, height, width]))
         spread = sensor.threshold_mismatch_log
@@ -159,40 +149,6 @@ class ReferenceStream:
         self._leak_per_us = (1e-6 * leak_hz * sensor.threshold_on_log).astype(np.float32)
         keys = np.random.SeedSequence([sensor.seed, *noise_key]).generate_state(2, np.uint64)
         self._key, self._phase_seed = np.uint64(keys[0]), int(keys[1])
-        # Rows: photoreceptor output, its slope per second, memorised value, refractory us left.
-        self._state = np.zeros((4, count), np.float32)
-        # Buffers that a step reuses: the state to be, and room for the step's events.
-        self._trial, self._room = self._state.copy(), np.empty((count, 4))
-        self._steps = -1
-        self._pending = np.zeros((0, 4))
-        self._bus = np.array([-1.0, -1.0])  # when the readout is free, and the row it serves
-
-    def step(self, pictures: NDArray[np.float32]) -> Events:
-        """Feed pictures (n, H, W) in lux; returns the events that can no longer change.
-
-        Raises:
-            ValueError: the pictures have another size, or a value is negative or not finite.
-        """
-        if pictures.shape[1:] != (self._height, self._width):
-            raise ValueError(
-                f"Expected pictures of {self._width}x{self._height}, got shape {pictures.shape}; "
-                "start the sensor with the scene's size"
-            )
-        if not (np.isfinite(pictures).all() and (pictures >= 0).all()):
-            raise ValueError("Expected finite light >= 0 lux, got other values; check the scene")
-        found = [self._pending]
-        for picture in pictures.reshape(len(pictures), -1).astype(np.float32, copy=False):
-            if self._steps < 0:
-                self._settle(picture)
-            else:
-                found.append(self._advance(picture))
-            self._steps += 1
-        self._pending = np.concatenate(found)
-        return self._deliver(max(self._steps, 0) * float(self._sensor.step_us))
-
-    def finish(self) -> Events:
-        """The events still waiting for the readout."""
-        return self._deliver(np.inf)
 
     def _settle(self, picture: NDArray[np.float32]) -> None:
         circuit = self._circuit
@@ -202,36 +158,15 @@ class ReferenceStream:
         on, off = self._thresholds
         self._state[2] = self._state[0] - on + place * (on + off)
 
-    def _advance(self, picture: NDArray[np.float32]) -> Array:
-        while True:
-            np.copyto(self._trial, self._state)
-            count = advance(
-                self._trial,
-                picture,
-                self._thresholds,
-                self._leak_per_us,
-                self._circuit,
-                self._key,
-                self._steps,
-                self._width,
-                self._room,
-            )
-            if count <= len(self._room):
-                self._state, self._trial = self._trial, self._state
-                return self._room[:count].copy()
-            self._room = np.empty((2 * count, 4))
-
-    def _deliver(self, until_us: float) -> Events:
-        """Pass on the requests made before `until_us`, in the order they were made."""
-        ready = self._pending[:, 0] < until_us
-        due, self._pending = self._pending[ready], self._pending[~ready]
-        due = due[np.lexsort((due[:, 1], due[:, 2], due[:, 0]))]
-        times = read_out(due, self._bus, self._circuit.row_service_us)
-        return Events(
-            t=times + np.int64(self._start_us),
-            x=due[:, 1].astype(np.uint16),
-            y=due[:, 2].astype(np.uint16),
-            p=due[:, 3].astype(np.uint8),
-            height=self._height,
-            width=self._width,
+    def _run(self, picture: NDArray[np.float32], state: NDArray[np.float32], room: Array) -> int:
+        return advance(
+            state,
+            picture,
+            self._thresholds,
+            self._leak_per_us,
+            self._circuit,
+            self._key,
+            self._steps,
+            self._width,
+            room,
         )

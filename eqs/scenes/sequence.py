@@ -15,9 +15,11 @@ from PIL import Image
 from eqs.events.writer import EventWriter
 from eqs.files import PARTIAL, read_json, write_json
 from eqs.scenes.camera import Exposure, FrameCamera
+from eqs.scenes.first_order import FirstOrderSensor
 from eqs.scenes.labels import LabelRule
 from eqs.scenes.plan import Street
 from eqs.scenes.sensor import ReferenceSensor
+from eqs.scenes.sensor_stream import EventSensor
 from eqs.scenes.world import DrivingWorld
 
 VERSION: Final = 11  # raise it whenever the same parameters give other files
@@ -39,7 +41,7 @@ class SequencePlan:
         width: columns of both cameras.
         frames: number of frames, 20 per second.
         seed: seed of the data set.
-        sensor: the reference event camera.
+        sensor: the event camera.
         camera: the frame camera.
         rule: which actors are labelled.
     """
@@ -50,7 +52,7 @@ class SequencePlan:
     width: int
     frames: int
     seed: int
-    sensor: ReferenceSensor
+    sensor: EventSensor
     camera: FrameCamera = field(default_factory=FrameCamera)
     rule: LabelRule = field(default_factory=LabelRule)
 
@@ -103,7 +105,9 @@ class SequencePlan:
     def of(cls, description: Mapping[str, Any]) -> SequencePlan:
         """The plan that a description of this version was made of."""
         values = {name: value for name, value in description.items() if name != "version"}
-        parts = {"sensor": ReferenceSensor, "camera": FrameCamera, "rule": LabelRule}
+        scanned = "scan_us" in values["sensor"]  # a parameter of that build alone
+        sensor = FirstOrderSensor if scanned else ReferenceSensor
+        parts = {"sensor": sensor, "camera": FrameCamera, "rule": LabelRule}
         return cls(**values | {name: kind(**values[name]) for name, kind in parts.items()})
 
     @property
