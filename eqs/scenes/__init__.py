@@ -1,9 +1,10 @@
-"""The procedural driving world and the two cameras that make `dsec_mini`."""
+"""Rendered worlds, the street of `dsec_mini` and scenes of other kinds, and their cameras."""
 
 from eqs.scenes.camera import Exposure, FrameCamera
 from eqs.scenes.first_order import FirstOrderSensor
 from eqs.scenes.generate import DSECMini
 from eqs.scenes.labels import TRACK_DTYPE, LabelRule
+from eqs.scenes.objects import FLICKER, HAND_HELD, NEARLY_STILL, PASSING, Manner, ObjectScene
 from eqs.scenes.plan import Street
 from eqs.scenes.scene_light import SceneLight
 from eqs.scenes.scenery import PaintedStreet, recorded_street
@@ -13,6 +14,10 @@ from eqs.scenes.sequence import SequencePlan
 from eqs.scenes.world import ActorsInView, DrivingWorld
 
 __all__ = [
+    "FLICKER",
+    "HAND_HELD",
+    "NEARLY_STILL",
+    "PASSING",
     "TRACK_DTYPE",
     "ActorsInView",
     "DSECMini",
@@ -22,6 +27,8 @@ __all__ = [
     "FirstOrderSensor",
     "FrameCamera",
     "LabelRule",
+    "Manner",
+    "ObjectScene",
     "PaintedStreet",
     "ReferenceSensor",
     "ReferenceStream",
