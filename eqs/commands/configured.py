@@ -75,6 +75,7 @@ CONFIGURED = {
     "train-simulator": Configured(
         config="train-simulator", module="train_simulator", pipeline="train_simulator"
     ),
+    "train-judge": Configured(config="train-judge", module="train_judge", pipeline="train_judge"),
     "prepare": Configured(config="prepare", module="prepare", pipeline="prepare"),
     "simulate": Configured(config="simulate", module="simulate", pipeline="simulate"),
     "render": Configured(config="render", module="render", pipeline="render"),

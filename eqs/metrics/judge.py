@@ -23,6 +23,8 @@ from eqs.metrics.network import (
 )
 from eqs.metrics.reading import Reading
 from eqs.metrics.windows import StreamOrHistograms
+from eqs.models import RVTBackbone
+from eqs.models.detector import cut_to
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,6 +120,15 @@ class Judge:
             own = OwnNetwork(settings=settings)
             return cls._of(own.trained(path), own, description)
         return cls._of(*trained_backbone(path, partition_split_32), description)
+
+    @classmethod
+    def shortened(cls, backbone: RVTBackbone, description: str) -> Self:
+        """What scores need of a trained RVT: the stages that they look at, in half precision."""
+        cut, size = cut_to(backbone, max(Definition.stages))
+        shape = RVTShape(
+            size=size, bins=cut.in_channels // 2, partition_split_32=cut.partition_split_32
+        )
+        return cls._of(cut, shape, description)
 
     @classmethod
     def _of(cls, backbone: nn.Module, network: Network, description: str) -> Self:

@@ -56,7 +56,8 @@ class RVTShape:
 
     def entries(self, backbone: nn.Module) -> dict[str, Any]:
         """What a file of its weights holds."""
-        weights = {f"backbone.{name}": x.cpu() for name, x in backbone.state_dict().items()}
+        named = backbone.state_dict().items()
+        weights = {f"backbone.{name}": halved(x.cpu()) for name, x in named}
         return {**weights, GEOMETRY: self.partition_split_32}
 
     def record(self) -> dict[str, Any]:
@@ -119,6 +120,12 @@ class OwnNetwork:
     def record(self) -> dict[str, Any]:
         """Plain values that `network_of` reads."""
         return dict(self.settings)
+
+
+def halved(x: torch.Tensor) -> torch.Tensor:
+    """The same values in half precision, where that holds all of them."""
+    half = x.half()
+    return half if torch.equal(half.float(), x) else x
 
 
 Network = RVTShape | OwnNetwork

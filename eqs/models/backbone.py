@@ -123,7 +123,7 @@ class Stage(nn.Module):
 
 
 class RVTBackbone(nn.Module):
-    """Four recurrent stages at strides 4, 8, 16 and 32.
+    """Four recurrent stages at strides 4, 8, 16 and 32, or the first of these.
 
     Convention: inputs of any size are padded with zeros at the right and at the bottom to the
     multiple of `32 * partition_split_32`; features and states have the padded size. The partition
@@ -131,14 +131,20 @@ class RVTBackbone(nn.Module):
     """
 
     def __init__(
-        self, in_channels: int, embed_dim: int, head_dim: int, partition_split_32: int = 2
+        self,
+        in_channels: int,
+        embed_dim: int,
+        head_dim: int,
+        partition_split_32: int = 2,
+        stages: int = 4,
     ) -> None:
         """Build stages of 1, 2, 4 and 8 times `embed_dim` channels."""
         super().__init__()
         self.in_channels = in_channels
         self.partition_split_32 = partition_split_32
         self.multiple = STRIDES[-1] * partition_split_32
-        self.widths = [embed_dim * factor for factor in (1, 2, 4, 8)]
+        self.widths = [embed_dim * factor for factor in (1, 2, 4, 8)][:stages]
+        self.strides = STRIDES[:stages]
         self.stages = nn.ModuleList(
             Stage(before, after, stride, head_dim)
             for before, after, stride in zip(

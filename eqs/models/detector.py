@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from eqs.models.attention import LAYER_SCALE_INIT, LayerScale
-from eqs.models.backbone import RVTBackbone
+from eqs.models.backbone import STRIDES, RVTBackbone
 from eqs.models.checkpoint import (
     STEM,
     check_entries,
@@ -243,15 +243,46 @@ def backbone_from_checkpoint(
             partition than the checkpoint's.
     """
     stem = "backbone."
-    weights = {
-        name.removeprefix(stem): x
-        for name, x in read_weights(path, "eqs.judge").items()
-        if name.startswith(stem)
-    }
+    names = read_weights(path, "eqs.judge")
+    weights = {name.removeprefix(stem): x for name, x in names.items() if name.startswith(stem)}
     embed_dim, in_channels = weights[STEM.removeprefix(stem)].shape[:2]
     size = size_of_width(embed_dim, path)
     partition = partition_of(path, partition_split_32, "eqs.judge")
-    backbone = RVTBackbone(in_channels, embed_dim, SIZES[size].head_dim, partition)
+    stages = stages_of(names)
+    backbone = RVTBackbone(in_channels, embed_dim, SIZES[size].head_dim, partition, stages)
     check_entries(backbone.state_dict(), weights, path, "eqs.judge to another file")
     backbone.load_state_dict(weights)
     return backbone, size
+
+
+def stages_of(names: Iterable[str]) -> int:
+    """Stages of the backbone in a file; one with a head needs all four, one without may be cut.
+
+    Example:
+        >>> stages_of(["backbone.stages.0.lstm.conv.weight", "backbone.stages.1.lstm.conv.weight"])
+        2
+    """
+    parts = [name.split(".") for name in names]
+    if any(part[0] != "backbone" for part in parts):
+        return len(STRIDES)
+    return min(len(STRIDES), 1 + max(int(part[2]) for part in parts if part[1] == "stages"))
+
+
+def cut_to(backbone: RVTBackbone, stages: int) -> tuple[RVTBackbone, str]:
+    """The first stages of a backbone in evaluation mode, weights rounded to half precision.
+
+    What these stages compute depends on no later one.
+
+    Returns:
+        The new backbone, frozen and in float32, and the name of its size.
+    """
+    embed_dim = backbone.widths[0]
+    size = size_of_width(embed_dim, "memory")
+    cut = RVTBackbone(
+        backbone.in_channels, embed_dim, SIZES[size].head_dim, backbone.partition_split_32, stages
+    )
+    kept = cut.state_dict().keys()
+    cut.load_state_dict(
+        {name: x.half().float() for name, x in backbone.state_dict().items() if name in kept}
+    )
+    return cut.eval().requires_grad_(False), size

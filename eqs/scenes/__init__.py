@@ -4,6 +4,7 @@ from eqs.scenes.camera import Exposure, FrameCamera
 from eqs.scenes.first_order import FirstOrderSensor
 from eqs.scenes.generate import DSECMini
 from eqs.scenes.labels import TRACK_DTYPE, LabelRule
+from eqs.scenes.lessons import Lesson, Lessons
 from eqs.scenes.objects import FLICKER, HAND_HELD, NEARLY_STILL, PASSING, Manner, ObjectScene
 from eqs.scenes.plan import Street
 from eqs.scenes.scene_light import SceneLight
@@ -27,6 +28,8 @@ __all__ = [
     "FirstOrderSensor",
     "FrameCamera",
     "LabelRule",
+    "Lesson",
+    "Lessons",
     "Manner",
     "ObjectScene",
     "PaintedStreet",

@@ -29,7 +29,7 @@ ROOMS = {
     "simulators.streaming simulators.learned",
     "eqs.simulators.learned": "files frames kernels models simulators simulators.pixel "
     "simulators.streaming",
-    "eqs.scenes": "events files frames processors kernels",
+    "eqs.scenes": "events files frames processors kernels representations",
     "eqs.scenes.traced": "extras frames scenes",
     "eqs.data": "content events files frames processors simulators",
     "eqs.models": "kernels",
