@@ -82,6 +82,7 @@ CONFIGURED = {
     "score": Configured(
         config="score", module="score_files", pipeline="score_files", translate=with_files
     ),
+    "trial": Configured(config="trial", module="trial", pipeline="trial"),
     "check": Configured(config="check", module="check", pipeline="check"),
     "calibrate": Configured(config="calibrate", module="calibrate", pipeline="calibrate"),
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import zipfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -165,20 +165,20 @@ def feature_centres(
         ValueError: there is no recording, or a feature is not finite.
     """
     sums = {tap: [_Moments() for _ in definition.stages] for tap in taps}
+    by_tap = {tap: replace(definition, tap=tap, mask="none") for tap in taps}
     for recording in recordings:
         chunks, windows = group_chunks([recording], definition, chunk_windows=chunk_windows)
         skip = definition.warmup_of(windows)
         for pooled in pooled_features(
             backbone,
             chunks,
-            taps=taps,
-            definition=definition,
+            definitions=[*by_tap.values()],
             device=device,
         ):
-            for tap in taps:
-                for running, stage in zip(sums[tap], pooled[tap], strict=True):
+            for tap, each in by_tap.items():
+                for running, stage in zip(sums[tap], pooled[each.maps], strict=True):
                     running.add(stage[skip:])
-            skip = max(0, skip - len(pooled[taps[0]][0]))
+            skip = max(0, skip - len(next(iter(pooled.values()))[0]))
     return {
         tap: Centre(
             tap=tap,

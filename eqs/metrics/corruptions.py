@@ -38,6 +38,12 @@ def polarity_flipped(events: Events) -> Events:
     return _replace(events, p=(1 - events.p).astype(np.uint8))
 
 
+def some_flipped(events: Events, share: float, *, seed: int = 0, key: str = "") -> Events:
+    """Brighter and darker swapped with probability `share`, event by event."""
+    flipped = _generator(seed, "flipped", key).random(len(events)) < share
+    return _replace(events, p=np.where(flipped, 1 - events.p, events.p).astype(np.uint8))
+
+
 def shifted_in_space(events: Events, columns: int = 0, rows: int = 0) -> Events:
     """The image moved right and down; what leaves the sensor is lost."""
     x, y = events.x.astype(np.int64) + columns, events.y.astype(np.int64) + rows

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, fields
-from typing import Literal, get_args, get_origin, get_type_hints
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Final, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 from eqs.files import short_hash
 
@@ -13,13 +13,26 @@ from eqs.files import short_hash
 ACTIVATIONS = ("gate", "gate_logits", "hidden", "cell", "attention", "downsample")
 
 # Choices on which the pooled features do not depend: a centre serves whatever these say.
-BESIDE_FEATURES = ("tap", "features", "stages", "mask", "warmup_windows", "architecture")
+BESIDE_FEATURES = (
+    "tap", "features", "distance", "stages", "mask", "warmup_windows", "architecture",
+)  # fmt: skip
+# Choices in which readings may differ that share one pass of the judge.
+OF_A_READING = ("tap", "features", "distance", "patch", "patch_size", "pooling", "mask")
+# The headline until version 2, which stays beside it, and the paper's to the letter.
+VERSION_1: Final[dict[str, Any]] = {
+    "features": "centred",
+    "distance": "cosine",
+    "patch": "cells",
+    "patch_size": 3,
+}
 
 # Choices that have one reading here. They are part of the hash, so that a later alternative
 # cannot be mistaken for this one.
 FIXED_RULES = {
+    "version": "2",
     "aggregation": "mean over patches, stages with equal weights, windows, sequences",
-    "distance": "cosine",
+    "agreement": "patches weigh by the squared lengths of both vectors together",
+    "silence": "response to no events in the same window, the last of the warm-up from then on",
     "normalised": "each window to 35 events per pixel and second, then at most count_cutoff",
     "border": "weights of real cells alone, padded right and bottom",
     "smooth": "triangle over the patch and half of each neighbour",
@@ -28,6 +41,15 @@ FIXED_RULES = {
     "whitened": "covariance of real features, shrunk by 0.1 towards its mean variance",
     "zero": "both zero 1, one zero 0, eps 1e-8",
 }
+
+
+class Maps(NamedTuple):
+    """Maps of an activation, pooled in one way."""
+
+    tap: str
+    patch: str
+    patch_size: int
+    pooling: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,8 +65,11 @@ class Definition:
     Args:
         tap: which activation of each stage is compared: gate (the paper's formula), gate_logits,
             hidden, cell, attention or downsample; of another network than RVT a name of its own.
-        features: compared as they are, `raw`; `centred`, minus the mean real feature; or also
-            `whitened`, so that real features vary alike in every direction.
+        features: compared as they are, `raw`; minus the judge's response to `silence`; `centred`,
+            minus the mean real feature; or also `whitened`, so that real features vary alike in
+            every direction.
+        distance: `cosine`, each patch alike; or `agreement`, in which lengths count as well and a
+            patch weighs by how much happens in it.
         stages: stages of the backbone, counted from 1.
         patch: `cells`, squares of so many cells, or `grid`, the map cut into so many by so many.
         patch_size: side of a patch in cells, or patches per side of the map.
@@ -69,10 +94,11 @@ class Definition:
     """
 
     tap: str = "hidden"
-    features: Literal["raw", "centred", "whitened"] = "raw"
+    features: Literal["raw", "silence", "centred", "whitened"] = "silence"
+    distance: Literal["cosine", "agreement"] = "agreement"
     stages: tuple[int, ...] = (1, 2, 3)
     patch: Literal["cells", "grid"] = "cells"
-    patch_size: int = 3
+    patch_size: int = 1
     pooling: Literal["box", "smooth"] = "box"
     state: Literal["carried", "reset"] = "carried"
     mask: Literal["none", "active"] = "none"
@@ -124,6 +150,22 @@ class Definition:
     def column(self) -> str:
         """Name of the reading in a table, for instance `hidden_centred` or `gate_raw`."""
         return f"{self.tap}_{self.features}"
+
+    @property
+    def needs_centre(self) -> bool:
+        """Whether it takes the mean of real features."""
+        return self.features in ("centred", "whitened")
+
+    @property
+    def maps(self) -> Maps:
+        """Which pooled maps it looks at."""
+        return Maps(self.tap, self.patch, self.patch_size, self.pooling)
+
+    @property
+    def one_pass(self) -> Definition:
+        """The same for all readings that share one pass of the judge."""
+        plain = Definition()
+        return replace(self, **{name: getattr(plain, name) for name in OF_A_READING})
 
     def warmup_of(self, windows: int) -> int:
         """Windows dropped at the start of a stream of `windows` windows."""

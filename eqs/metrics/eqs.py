@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,24 +14,24 @@ from eqs.metrics.definition import Definition, choices
 from eqs.metrics.judge import Judge
 from eqs.metrics.reading import Reading
 from eqs.metrics.scoring import StreamScore, Watcher, score_streams, score_tensors
+from eqs.metrics.silence import Silence
 from eqs.metrics.windows import StreamOrHistograms
-
-log = logging.getLogger(__name__)
 
 
 class EventQualityScore(Metric):
     r"""How similar a simulated event stream looks to a real one, to a trained detector.
 
     Both streams are cut into the same windows and run side by side through the first stages of a
-    recurrent backbone. The score is the mean cosine between their patch-pooled features,
+    recurrent backbone. With :math:`a` and :math:`b` the hidden states of a stage, minus the
+    judge's response to silence, the score is their agreement,
 
-    .. math:: \mathrm{EQS} = \frac{1}{K S} \sum_{k,s} \frac{1}{P_s} \sum_p
-        \cos(f_{ksp}^{sim} - m_s,\; f_{ksp}^{real} - m_s)
+    .. math:: \mathrm{EQS} = \frac{1}{K S} \sum_{k,s} \frac{2 \sum_p a_{ksp} \cdot b_{ksp}}
+        {\sum_p \|a_{ksp}\|^2 + \sum_p \|b_{ksp}\|^2}
 
-    over windows :math:`k` after the warm-up, stages :math:`s` and patches :math:`p`, with the mean
-    real feature :math:`m_s` where the score is centred and zero where it is not; whitened vectors
-    are also multiplied by a matrix :math:`W_s` (`whitening_matrix`). `compute` returns the
-    unweighted mean over updates, one update being one sequence.
+    over windows :math:`k` after the warm-up, stages :math:`s` and cells :math:`p`. Other choices
+    (`Definition`) read other activations, subtract the mean real feature or nothing, whiten, pool
+    cells to patches or take the mean cosine, as the first version and the paper do. `compute`
+    returns the unweighted mean over updates, one update being one sequence.
 
     Convention: EQS is a similarity in [-1, 1], higher is better, 1 for identical streams; the
     distance is `1 - EQS`. The published text defines the distance and tabulates the similarity.
@@ -42,8 +41,7 @@ class EventQualityScore(Metric):
 
     Args:
         judge: what scores: a folder with `judge.json`, as `train.py sim=real` leaves it; the
-            checkpoint of a detector trained on real events, whose scores are raw; "random", a
-            control; or a `Judge`.
+            checkpoint of a detector trained on real events; "random", a control; or a `Judge`.
         partition_split_32: of a bare checkpoint, where it is not 2; a folder knows its own.
         chunk_windows: windows per pass; chosen from the sensor size if None. It changes memory
             and speed, not the score.
@@ -89,15 +87,10 @@ class EventQualityScore(Metric):
         given = {name: value for name, value in chosen.items() if value is not None}
         self.judge = judge
         self.reading = judge.reading(**given)
-        if "features" not in given and not judge.centres:
-            log.warning(
-                "The judge (%s) has no centre: its scores are raw, and raw scores hardly tell one "
-                "stream from another; give it one with Judge.centred_on",
-                judge.description,
-            )
         self.chunk_windows = chunk_windows
         self.last: StreamScore | None = None
         self.backbone = judge.backbone
+        self.silence = Silence(judge.backbone, judge.device)
         self.add_state("total", torch.zeros((), dtype=torch.float64), dist_reduce_fx="sum")
         self.add_state("sequences", torch.zeros((), dtype=torch.int64), dist_reduce_fx="sum")
 
@@ -156,9 +149,16 @@ class EventQualityScore(Metric):
             start_us=start_us,
             stop_us=stop_us,
             chunk_windows=self.chunk_windows,
+            silence=self._silence(),
             watch=watch,
             device=self.judge.device,
         )
+
+    def _silence(self) -> Silence:
+        """The responses to nothing, computed anew where the judge has moved."""
+        if self.silence.device != self.judge.device:
+            self.silence = Silence(self.backbone, self.judge.device)
+        return self.silence
 
     def update(
         self,
@@ -207,7 +207,12 @@ class EventQualityScore(Metric):
             ValueError: the shapes differ, or a histogram or a feature is not finite.
         """
         return 1.0 - score_tensors(
-            self.backbone, real, simulated, self.reading, device=self.judge.device
+            self.backbone,
+            real,
+            simulated,
+            self.reading,
+            silence=self._silence(),
+            device=self.judge.device,
         )
 
     def reset(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor, nn
 
-from eqs.metrics.definition import ACTIVATIONS, Definition
+from eqs.metrics.definition import ACTIVATIONS, Definition, Maps
 from eqs.metrics.pooling import pool_grid, pool_patches, smooth_grid, smooth_patches
 from eqs.metrics.windows import normalised_counts
 
@@ -23,6 +23,9 @@ POOLS = {
     ("grid", "box"): pool_grid,
     ("grid", "smooth"): smooth_grid,
 }
+
+Pooled = dict[Maps, list[Tensor]]
+"""Pooled maps by stage."""
 
 # Whatever a backbone carries from one window to the next; only the backbone looks inside.
 BackboneState = Any
@@ -117,11 +120,10 @@ def pooled_features(
     backbone: TappedBackbone,
     chunks: Iterable[Tensor],
     *,
-    taps: Sequence[str],
-    definition: Definition,
+    definitions: Sequence[Definition],
     device: torch.device | str = "cpu",
     gradients: bool = False,
-) -> Iterator[dict[str, list[Tensor]]]:
+) -> Iterator[Pooled]:
     """Run streams side by side through the backbone and pool its maps.
 
     The state is carried from chunk to chunk, one per stream, from zero, or reset for every window.
@@ -130,22 +132,23 @@ def pooled_features(
     Args:
         backbone: network with `taps`; it runs in evaluation mode and in float32.
         chunks: histograms, shape (windows, streams, channels, height, width) each.
-        taps: activations to pool.
-        definition: stages, patches, counts and state.
+        definitions: what is read; they share one pass, see `Definition.one_pass`.
         device: where the backbone lives.
         gradients: keep what the gradients of the features with respect to the chunks need.
 
     Yields:
-        For each chunk, by tap a list by stage of shape (windows, streams, channels, patch rows,
-        patch columns), float32. Under a mask also, as `ACTIVE`, whether a patch has events, bool,
-        with one channel.
+        For each chunk, by `Definition.maps` a list by stage of shape (windows, streams, channels,
+        patch rows, patch columns), float32. Under a mask also, as the tap `ACTIVE`, whether a patch
+        has events, bool, with one channel.
 
     Raises:
         ValueError: the backbone has fewer stages or no such tap, or its maps have other shapes.
     """
+    taps = sorted({each.tap for each in definitions})
     require_taps(backbone, taps)
-    stages, side = definition.stages, definition.patch_size
-    pool = POOLS[definition.patch, definition.pooling]
+    definition, stages = definitions[0], definitions[0].stages
+    wanted = {each.maps for each in definitions}
+    masked = {each.maps._replace(tap=ACTIVE) for each in definitions if each.mask == "active"}
     strides = strides_of(backbone, stages)
     states: BackboneState = None
     for chunk in chunks:
@@ -158,19 +161,29 @@ def pooled_features(
                 x, states = x.flatten(0, 1)[None], None
             maps, states = backbone.taps(x, states, stages=stages, names=tuple(taps))
             check_maps(maps, taps, strides, tuple(x.shape))
-            pooled = {
+            whole = {
                 name: [
-                    pool(full[..., : -(-height // stride), : -(-width // stride)].float(), side)
+                    full[..., : -(-height // stride), : -(-width // stride)]
+                    .float()
                     .flatten(0, 1)
                     .unflatten(0, (windows, streams))
                     for full, stride in zip(maps[name], strides, strict=True)
                 ]
                 for name in taps
             }
-            if definition.mask == "active":
+            pooled = {each: [pool_of(each, stage) for stage in whole[each.tap]] for each in wanted}
+            if masked:
                 total = counts.sum(dim=2, keepdim=True)
-                pooled[ACTIVE] = [pool(pool_patches(total, px), side) > 0 for px in strides]
+                events = [pool_patches(total, px) for px in strides]
+                pooled |= {each: [pool_of(each, stage) > 0 for stage in events] for each in masked}
         yield pooled
+
+
+def pool_of(maps: Maps, stage: Tensor) -> Tensor:
+    """The maps (..., channels, rows, columns) of a stage pooled as asked for."""
+    if maps.patch == "cells" and maps.patch_size == 1 and maps.pooling == "box":
+        return stage
+    return POOLS[maps.patch, maps.pooling](stage, maps.patch_size)
 
 
 def check_maps(

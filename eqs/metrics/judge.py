@@ -11,7 +11,7 @@ import torch
 from torch import nn
 
 from eqs.metrics.centre import Centre, feature_centres
-from eqs.metrics.definition import Definition, choices
+from eqs.metrics.definition import VERSION_1, Definition, choices
 from eqs.metrics.features import TappedBackbone, choices_for, require_taps
 from eqs.metrics.judge_folder import RECORD, WEIGHTS, file_of, read_judge, write_judge
 from eqs.metrics.network import (
@@ -26,6 +26,19 @@ from eqs.metrics.windows import StreamOrHistograms
 from eqs.models import RVTBackbone
 from eqs.models.detector import cut_to
 
+SHIPPED = Path(__file__).parents[1] / "judges"
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the judges that come with the package."""
+    return tuple(sorted(path.parent.name for path in SHIPPED.glob(f"*/{RECORD}")))
+
+
+def place_of(name: Path | str) -> Path:
+    """Where the judge of that name lies: one of the package's, unless there is such a path."""
+    path = Path(name)
+    return SHIPPED / path if str(name) in shipped() and not path.exists() else path
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judge:
@@ -38,15 +51,15 @@ class Judge:
         backbone: the network.
         definition: what its scores mean where nobody chooses otherwise: the headline.
         weights_sha256: hash of the network's named tensors; empty where it has none.
-        centres: mean real features, one for each activation and way to pool; without any, scores
-            are raw.
+        centres: mean real features, one for each activation and way to pool, for readings that
+            subtract them.
         network: what builds the network again; None for one that is only in memory.
         description: what it was trained on, in a phrase.
 
     Example:
         >>> judge = Judge.random(size="tiny")
         >>> judge.definition.features, judge.reading(tap="gate").name
-        ('raw', 'gate_raw')
+        ('silence', 'gate_silence')
     """
 
     backbone: TappedBackbone
@@ -82,7 +95,7 @@ class Judge:
 
     @classmethod
     def built(cls, settings: Mapping[str, Any]) -> Self:
-        """A judge around a network of your own, without centres, whose scores are raw.
+        """A judge around a network of your own, without centres.
 
         Args:
             settings: keyword arguments of a torch module that is a `TappedBackbone`, with the
@@ -102,7 +115,7 @@ class Judge:
         partition_split_32: int | None = None,
         settings: Mapping[str, Any] | None = None,
     ) -> Self:
-        """A judge without centres from a detector's checkpoint, whose scores are raw.
+        """A judge without centres from a detector's checkpoint.
 
         Args:
             path: checkpoint of a detector trained on real events.
@@ -143,14 +156,15 @@ class Judge:
         Weights that lie in a judge's folder are that judge.
 
         Args:
-            place: folder with `judge.json`, checkpoint of a detector, or `random`.
+            place: name of one in the package, folder with `judge.json`, checkpoint of a
+            detector, or `random`.
             partition_split_32: of a bare checkpoint, where it is not 2; a folder knows its own.
 
         Raises:
             FileNotFoundError: there is neither.
             ValueError: weights or centres are not those that the record names.
         """
-        path = Path(place)
+        path = place_of(place)
         folder = path.parent if path.name == WEIGHTS else path
         if (folder / RECORD).is_file():
             judge = cls(**read_judge(folder))
@@ -208,14 +222,14 @@ class Judge:
             ValueError: a choice is impossible, or it needs a centre that the judge lacks.
         """
         definition = self.define(**chosen)
-        if definition.features == "raw":
+        if not definition.needs_centre:
             return Reading(definition=definition)
         centre = self.centre_for(definition)
         if centre is None:
             raise ValueError(
                 f"Expected a judge with a centre of the activation {definition.tap}, pooled and "
                 f"binned as chosen, for {definition.features} features, got one without; set "
-                "eqs.judge, or eqs.features=raw"
+                "eqs.judge, or eqs.features=silence"
             )
         return Reading(definition=definition, centre=centre)
 
@@ -238,14 +252,15 @@ class Judge:
         content: str = "",
         **chosen: Any,  # noqa: ANN401
     ) -> Self:
-        """The same judge with the mean features of real recordings; its headline is then centred.
+        """The same judge with the mean features of real recordings, for readings with a centre.
 
         Args:
             recordings: real recordings, those the network was trained on.
             taps: activations to compute a centre for.
             chunk_windows: windows per pass; chosen from the sensor size if None.
             content: hash of what the recordings hold, which the centres keep.
-            **chosen: how features are pooled and binned, where not as in the headline.
+            **chosen: how features are pooled and binned, where not as in `VERSION_1` and as the
+                judge bins.
 
         Raises:
             ValueError: there is no recording, or a feature is not finite.
@@ -254,15 +269,14 @@ class Judge:
             self.backbone,
             recordings,
             taps=taps,
-            definition=self.define(**chosen),
+            definition=self.define(**{**VERSION_1, **chosen}),
             chunk_windows=chunk_windows,
             device=self.device,
         )
         noted = (replace(centre, recordings=content) for centre in made.values())
         new = {file_of(centre): centre for centre in noted}
         kept = {file_of(centre): centre for centre in self.centres}
-        headline = replace(self.definition, features="centred")
-        return replace(self, definition=headline, centres=tuple({**kept, **new}.values()))
+        return replace(self, centres=tuple({**kept, **new}.values()))
 
     def untrained(self, seed: int = 0) -> Judge:
         """The control of this judge: its network with random weights and no centre.
@@ -272,7 +286,7 @@ class Judge:
         """
         network = self._network()
         control = Judge._of(network.untrained(seed), network, "random weights, a control")
-        return replace(control.to(self.device), definition=replace(self.definition, features="raw"))
+        return replace(control.to(self.device), definition=self.definition)
 
     def _network(self) -> Network:
         if self.network is None:

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor
 
 from eqs.metrics.centre import Centre
-from eqs.metrics.definition import Definition
+from eqs.metrics.definition import Definition, Maps
 from eqs.metrics.features import ACTIVE
-from eqs.metrics.similarity import patch_cosine
+from eqs.metrics.similarity import moved, patch_agreement, patch_cosine
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +20,7 @@ class Reading:
 
     Args:
         definition: every choice of the score.
-        centre: mean real feature; needed where the features are not raw.
+        centre: mean real feature; needed where the features are centred or whitened.
 
     Raises:
         ValueError: the centre is missing, not asked for, of another tap or of features made
@@ -32,7 +32,7 @@ class Reading:
 
     def __post_init__(self) -> None:
         """Check that definition and centre belong together."""
-        if (self.definition.features == "raw") != (self.centre is None):
+        if self.definition.needs_centre != (self.centre is not None):
             wanted, got = ("a", "none") if self.centre is None else ("no", "one")
             raise ValueError(
                 f"Expected {wanted} centre for {self.definition.features} features, got {got}; "
@@ -77,32 +77,48 @@ class Comparison:
             if self.definition.features == "whitened":
                 self.whitenings = [*reading.centre.whitening(self.definition.stages)]
 
-    def cosines(self, pooled: Mapping[str, Sequence[Tensor]]) -> list[tuple[Tensor, Tensor]]:
-        """By stage each patch's cosine, and 1 where it counts.
+    def similarities(
+        self, pooled: Mapping[Maps, Sequence[Tensor]], silence: Sequence[Tensor] | None = None
+    ) -> list[tuple[Tensor, Tensor]]:
+        """By stage each patch's similarity, and how much it weighs.
 
         Args:
-            pooled: by tap and stage (windows, streams, channels, rows, columns), the reference
+            pooled: by maps and stage (windows, streams, channels, rows, columns), the reference
                 first.
+            silence: by stage the response to no events in the same windows, (windows, 1, channels,
+                rows, columns); needed by definitions that subtract it.
 
         Returns:
             Both of shape (windows, candidates, rows, columns).
         """
-        found = []
-        maps, masks = pooled[self.definition.tap], pooled.get(ACTIVE, self.nothing)
+        chosen = self.definition
+        maps, found = pooled[chosen.maps], []
+        if chosen.features == "silence" and silence is not None:
+            maps = [stage - each for stage, each in zip(maps, silence, strict=True)]
+        masks = pooled.get(chosen.maps._replace(tap=ACTIVE), self.nothing)
+        if chosen.mask == "none":
+            masks = self.nothing
         stages = zip(maps, masks, self.centres, self.whitenings, strict=True)
         for stage, active, centre, whitening in stages:
-            cosine = patch_cosine(stage[:, 1:], stage[:, :1], centre, whitening).double()
-            if not torch.isfinite(cosine).all():
+            if not torch.isfinite(stage).all():
                 raise ValueError(
                     "Expected finite features, got NaN or infinity; set eqs.judge to a sound one"
                 )
-            counts = torch.ones_like(cosine)
+            similarity, weight = self._compare(stage[:, 1:], stage[:, :1], centre, whitening)
             if active is not None:
-                counts = (active[:, 1:, 0] | active[:, :1, 0]).double()
-            found.append((cosine, counts))
+                weight = weight * (active[:, 1:, 0] | active[:, :1, 0])
+            found.append((similarity, weight))
         return found
 
+    def _compare(
+        self, a: Tensor, b: Tensor, centre: Tensor | None, whitening: Tensor | None
+    ) -> tuple[Tensor, Tensor]:
+        if self.definition.distance == "agreement":
+            return patch_agreement(moved(a, centre, whitening), moved(b, centre, whitening))
+        cosine = patch_cosine(a, b, centre, whitening).double()
+        return cosine, torch.ones_like(cosine)
 
-def mean_over_patches(cosine: Tensor, counts: Tensor) -> Tensor:
-    """Mean of the patches that count; NaN where none does."""
-    return (cosine * counts).sum(dim=(-2, -1)) / counts.sum(dim=(-2, -1))
+
+def mean_over_patches(similarity: Tensor, weight: Tensor) -> Tensor:
+    """Weighted mean of the patches; NaN where none counts."""
+    return (similarity * weight).sum(dim=(-2, -1)) / weight.sum(dim=(-2, -1))

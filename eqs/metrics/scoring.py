@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from eqs.metrics.definition import Definition
-from eqs.metrics.features import TappedBackbone, pooled_features, strides_of
+from eqs.metrics.definition import OF_A_READING, Definition, Maps
+from eqs.metrics.features import Pooled, TappedBackbone, pooled_features, strides_of
 from eqs.metrics.reading import Comparison, Reading, mean_over_patches
+from eqs.metrics.silence import Silence
 from eqs.metrics.similarity import combine_maps
 from eqs.metrics.windows import StreamOrHistograms, group_chunks
 
-Watcher = Callable[[Mapping[str, Sequence[Tensor]]], None]
-"""Sees the pooled features of every window that counts: by tap and stage a map of shape
+Watcher = Callable[[Mapping[Maps, Sequence[Tensor]]], None]
+"""Sees the pooled features of every window that counts: by maps and stage a tensor of shape
 (windows, streams, channels, rows, columns), the reference first."""
 
 
@@ -59,6 +61,7 @@ def score_group(
     n_windows: int,
     readings: Sequence[Reading],
     *,
+    silence: Silence | None = None,
     watch: Watcher | None = None,
     device: torch.device | str = "cpu",
 ) -> list[dict[str, StreamScore]]:
@@ -72,7 +75,8 @@ def score_group(
         chunks: histograms, shape (windows, 1 + candidates, 2 * bins, height, width) each; the
             reference comes first.
         n_windows: windows in all chunks together.
-        readings: readings that differ only in tap and features.
+        readings: readings that share one pass, see `Definition.one_pass`.
+        silence: the judge's responses to nothing, as far as they are known.
         watch: sees the same features.
         device: where the backbone lives.
 
@@ -83,23 +87,22 @@ def score_group(
         ValueError: the readings do not share one pass, or a feature is not finite.
     """
     first = _shared_pass(readings)
-    taps = sorted({reading.definition.tap for reading in readings})
+    silence = silence or Silence(backbone, device)
+    definitions = [reading.definition for reading in readings]
+    listening = [each for each in definitions if each.features == "silence"]
     strides = strides_of(backbone, first.stages)
-    skip = first.warmup_of(n_windows)
+    skip, done = first.warmup_of(n_windows), 0
     totals = {reading.name: _Tally(reading, skip, strides) for reading in readings}
-    for pooled in pooled_features(
-        backbone,
-        chunks,
-        taps=taps,
-        definition=first,
-        device=device,
-    ):
+    for chunk, pooled in paired(backbone, chunks, definitions, device):
+        (height, width), windows = chunk.shape[-2:], len(chunk)
+        silent = {}
+        if listening:
+            silent = silence.responses(listening, (height, width), done, windows)
         for tally in totals.values():
-            tally.add(pooled, skip)
-        windows = len(pooled[taps[0]][0])
+            tally.add(pooled, silent, skip)
         if watch is not None and windows > skip:
-            watch({tap: [stage[skip:] for stage in stages] for tap, stages in pooled.items()})
-        skip = max(0, skip - windows)
+            watch({maps: [stage[skip:] for stage in stages] for maps, stages in pooled.items()})
+        skip, done = max(0, skip - windows), done + windows
     by_reading = {name: tally.scores() for name, tally in totals.items()}
     candidates = len(next(iter(by_reading.values())))
     return [
@@ -116,6 +119,7 @@ def score_streams(
     start_us: int | None = None,
     stop_us: int | None = None,
     chunk_windows: int | None = None,
+    silence: Silence | None = None,
     watch: Watcher | None = None,
     device: torch.device | str = "cpu",
 ) -> list[dict[str, StreamScore]]:
@@ -125,10 +129,11 @@ def score_streams(
         backbone: the judge's network.
         reference: real stream, or its histograms of shape (windows, 2 * bins, height, width).
         candidates: streams of the same kind, sensor and clock.
-        readings: readings that differ only in tap and features.
+        readings: readings that share one pass, see `Definition.one_pass`.
         start_us: start of the first window; by default where all streams have begun.
         stop_us: time that no window may pass; by default where the first stream ends.
         chunk_windows: windows per pass; chosen from the sensor size if None.
+        silence: the judge's responses to nothing, as far as they are known.
         watch: sees the same features.
         device: where the backbone lives.
 
@@ -145,7 +150,9 @@ def score_streams(
         stop_us=stop_us,
         chunk_windows=chunk_windows,
     )
-    return score_group(backbone, chunks, windows, readings, watch=watch, device=device)
+    return score_group(
+        backbone, chunks, windows, readings, silence=silence, watch=watch, device=device
+    )
 
 
 def score_tensors(
@@ -154,6 +161,7 @@ def score_tensors(
     candidate: Tensor,
     reading: Reading,
     *,
+    silence: Silence | None = None,
     device: torch.device | str = "cpu",
 ) -> Tensor:
     """The score of one candidate's histograms, with gradients with respect to both.
@@ -163,6 +171,7 @@ def score_tensors(
         reference: histograms, shape (windows, 2 * bins, height, width).
         candidate: histograms of the same shape.
         reading: what is compared and how.
+        silence: the judge's responses to nothing, as far as they are known.
         device: where the backbone lives.
 
     Returns:
@@ -171,31 +180,48 @@ def score_tensors(
     Raises:
         ValueError: the shapes differ, or a histogram or a feature is not finite.
     """
-    definition = reading.definition
+    definition, comparison = reading.definition, Comparison(reading)
+    silence = silence or Silence(backbone, device)
     chunks, windows = group_chunks([reference, candidate], definition)
-    curves = []
-    for pooled in pooled_features(
-        backbone, chunks, taps=[definition.tap], definition=definition, device=device,
-        gradients=True,
-    ):  # fmt: skip
-        cosines = Comparison(reading).cosines(pooled)
-        curves.append(torch.stack([mean_over_patches(*each) for each in cosines], dim=-1)[:, 0])
+    curves, done = [], 0
+    for chunk, pooled in paired(backbone, chunks, [definition], device, gradients=True):
+        silent = None
+        if definition.features == "silence":
+            (height, width), count = chunk.shape[-2:], len(chunk)
+            responses = silence.responses([definition], (height, width), done, count)
+            silent = responses[definition.maps]
+        found = comparison.similarities(pooled, silent)
+        curves.append(torch.stack([mean_over_patches(*each) for each in found], dim=-1)[:, 0])
+        done += len(chunk)
     counting = torch.cat(curves)[definition.warmup_of(windows) :]
     return counting.nanmean(dim=0).nan_to_num(nan=1.0).mean()
 
 
 def _shared_pass(readings: Sequence[Reading]) -> Definition:
     """The choices that all readings share, or an error where they do not."""
-    shared = {
-        replace(reading.definition, tap=readings[0].definition.tap, features="raw")
-        for reading in readings
-    }
+    shared = {reading.definition.one_pass for reading in readings}
     if len(shared) != 1 or len({reading.name for reading in readings}) < len(readings):
         raise ValueError(
-            "Expected readings that differ in tap or features and share all other choices, got "
-            f"{[reading.name for reading in readings]} with {len(shared)} sets of other choices"
+            f"Expected readings of different names that differ in {', '.join(OF_A_READING)} alone, "
+            f"got {[reading.name for reading in readings]} with {len(shared)} sets of other choices"
         )
     return readings[0].definition
+
+
+def paired(
+    backbone: TappedBackbone,
+    chunks: Iterable[Tensor],
+    definitions: Sequence[Definition],
+    device: torch.device | str,
+    *,
+    gradients: bool = False,
+) -> Iterator[tuple[Tensor, Pooled]]:
+    """Each chunk of histograms with its pooled features."""
+    first, second = itertools.tee(chunks)
+    features = pooled_features(
+        backbone, second, definitions=definitions, device=device, gradients=gradients
+    )
+    return zip(first, features, strict=True)
 
 
 class _Tally:
@@ -206,19 +232,24 @@ class _Tally:
         self.warmup, self.strides = warmup, strides
         self.curves: list[Tensor] = []
         self.sums: list[Tensor] = []
-        """By stage, for every patch, the summed cosines and the number of windows that count."""
+        """By stage, for every patch, the weighted similarities and the weights, summed."""
 
-    def add(self, pooled: Mapping[str, Sequence[Tensor]], skip: int) -> None:
+    def add(
+        self,
+        pooled: Mapping[Maps, Sequence[Tensor]],
+        silent: Mapping[Maps, Sequence[Tensor]],
+        skip: int,
+    ) -> None:
         """Compare a chunk's streams, by stage (windows, streams, channels, rows, columns).
 
         The chunk's first `skip` windows are warm-up and only show in the curve.
         """
-        cosines = self.comparison.cosines(pooled)
-        curve = torch.stack([mean_over_patches(*each) for each in cosines], dim=-1)
+        found = self.comparison.similarities(pooled, silent.get(self.definition.maps))
+        curve = torch.stack([mean_over_patches(*each) for each in found], dim=-1)
         self.curves.append(curve.cpu())
         sums = [
-            torch.stack([cosine * counts, counts])[:, skip:].sum(dim=1).cpu()
-            for cosine, counts in cosines
+            torch.stack([similarity * weight, weight])[:, skip:].sum(dim=1).cpu()
+            for similarity, weight in found
         ]
         before = self.sums or [torch.zeros_like(stage) for stage in sums]
         self.sums = [a + b for a, b in zip(before, sums, strict=True)]
@@ -228,7 +259,7 @@ class _Tally:
         if not self.curves:
             raise ValueError("Expected at least one window, got none")
         curve = torch.cat(self.curves)
-        # Without a single active patch both streams are silent, and silence equals silence.
+        # Where no patch counts in any window both streams are silent, and silence equals silence.
         by_stage = curve[self.warmup :].nanmean(dim=0).nan_to_num(nan=1.0)
         cells = self.definition.patch == "cells"
         strides = self.strides if cells else [1] * len(self.strides)

@@ -42,17 +42,7 @@ def patch_cosine(
         >>> round(patch_cosine(x, y).item(), 6)
         0.5
     """
-    if centre is not None:
-        if centre.shape != (a.shape[-3],):
-            raise ValueError(
-                f"Expected a centre of {a.shape[-3]} channels, got shape {tuple(centre.shape)}; "
-                "set eqs.centre to the centre of this backbone and tap"
-            )
-        column = centre.to(a)[:, None, None]
-        a, b = a - column, b - column
-    if whitening is not None:
-        matrix = whitening.to(a)
-        a, b = (torch.einsum("dc,...cij->...dij", matrix, each) for each in (a, b))
+    a, b = (moved(each, centre, whitening) for each in (a, b))
     length_a = torch.linalg.vector_norm(a, dim=-3)
     length_b = torch.linalg.vector_norm(b, dim=-3)
     unit_a = a / length_a.clamp_min(eps).unsqueeze(-3)
@@ -60,6 +50,63 @@ def patch_cosine(
     zero_a, zero_b = length_a <= eps, length_b <= eps
     cosine = (unit_a * unit_b).sum(dim=-3).clamp(-1.0, 1.0)
     return torch.where(zero_a | zero_b, (zero_a & zero_b).to(cosine.dtype), cosine)
+
+
+def moved(x: Tensor, centre: Tensor | None = None, whitening: Tensor | None = None) -> Tensor:
+    """Features from a centre on and whitened, if asked for.
+
+    Args:
+        x: shape (..., channels, rows, columns).
+        centre: feature vector, shape (channels,), that is subtracted.
+        whitening: matrix, shape (channels, channels), that is then applied.
+
+    Raises:
+        ValueError: the centre has another number of channels.
+    """
+    if centre is not None:
+        if centre.shape != (x.shape[-3],):
+            raise ValueError(
+                f"Expected a centre of {x.shape[-3]} channels, got shape {tuple(centre.shape)}; "
+                "set eqs.judge to one with a centre of this backbone and tap"
+            )
+        x = x - centre.to(x)[:, None, None]
+    return x if whitening is None else torch.einsum("dc,...cij->...dij", whitening.to(x), x)
+
+
+def patch_agreement(a: Tensor, b: Tensor, eps: float = 1e-4) -> tuple[Tensor, Tensor]:
+    r"""Agreement of the feature vectors of two streams, patch by patch, and what it weighs.
+
+    .. math:: s_p = \frac{2\, a_p \cdot b_p}{\|a_p\|^2 + \|b_p\|^2}, \qquad
+        w_p = \|a_p\|^2 + \|b_p\|^2
+
+    The weighted mean of a map is :math:`2 \sum a \cdot b / (\sum \|a\|^2 + \sum \|b\|^2)`, one
+    minus the squared distance of the maps over their squared lengths.
+
+    Convention: vectors whose entries are `eps` or less, root of the mean square of both streams
+    together, are nothing and weigh nothing.
+
+    Args:
+        a: features of one stream, from where nothing happens, shape (..., channels, rows, columns).
+        b: those of the other, same shape or one that broadcasts to it.
+        eps: what rounding leaves of a response to nothing.
+
+    Returns:
+        Agreement in [-1, 1] and weight, both of shape (..., rows, columns), float64.
+
+    Source: the coefficient is that of Lin, "A concordance correlation coefficient", Biometrics
+    1989, with the response to silence in place of the means.
+
+    Example:
+        >>> a = torch.tensor([1.0, 0.0]).view(2, 1, 1)
+        >>> agreement, weight = patch_agreement(a, 2 * a)
+        >>> agreement.item(), weight.item()
+        (0.8, 5.0)
+    """
+    a, b = a.double(), b.double()
+    weight = (a * a).sum(dim=-3) + (b * b).sum(dim=-3)
+    something = weight > 2 * a.shape[-3] * eps**2
+    agreement = 2 * (a * b).sum(dim=-3) / torch.where(something, weight, 1.0)
+    return agreement * something, weight * something
 
 
 def whitening_matrix(covariance: Tensor, shrinkage: float = 0.1) -> Tensor:
@@ -124,7 +171,8 @@ def combine_maps(stages: Sequence[Tensor], strides: Sequence[int]) -> Tensor:
 
     Every coarse patch is repeated over the fine patches whose top left pixel it covers. Ragged
     patches weigh as much as full ones within a stage but not after the repetition, so the mean of
-    this map may differ slightly from the score.
+    this map may differ slightly from the score. A patch that does not count, NaN, is left to the
+    other stages.
 
     Args:
         stages: patch similarities by stage, shape (..., rows, columns) each.
@@ -140,7 +188,7 @@ def combine_maps(stages: Sequence[Tensor], strides: Sequence[int]) -> Tensor:
     """
     finest = min(range(len(stages)), key=lambda index: strides[index])
     rows, columns = stages[finest].shape[-2:]
-    total = torch.zeros_like(stages[finest])
+    repeated = []
     for stage, stride in zip(stages, strides, strict=True):
         at_row = torch.arange(rows, device=stage.device) * strides[finest] // stride
         at_column = torch.arange(columns, device=stage.device) * strides[finest] // stride
@@ -148,5 +196,5 @@ def combine_maps(stages: Sequence[Tensor], strides: Sequence[int]) -> Tensor:
             at_row.clamp_max(stage.shape[-2] - 1),
             at_column.clamp_max(stage.shape[-1] - 1),
         )
-        total = total + stage[..., at_row[:, None], at_column[None, :]]
-    return total / len(stages)
+        repeated.append(stage[..., at_row[:, None], at_column[None, :]])
+    return torch.stack(repeated).nanmean(dim=0)

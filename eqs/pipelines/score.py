@@ -127,7 +127,7 @@ def score_scene(
     """Add the scores of one recording; `other`, of the same size, lends the chance level."""
     start, stop = scene.grid.start_us, scene.grid.stop_us
     candidates = list(streams.values())
-    frechet = FeatureFrechet(scoring.headline.definition.tap)
+    frechet = FeatureFrechet(scoring.headline.definition.maps)
     found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
     untrained = untrained_scores(scoring, real, candidates, start, stop)
     frames = scene.frame_times_us
@@ -212,12 +212,12 @@ def untrained_scores(
     start_us: int,
     stop_us: int,
 ) -> list[float]:
-    """The headline with an untrained network, whose centre is this recording's own."""
+    """The headline with an untrained network; a centre that it needs is this recording's own."""
     headline = scoring.headline.definition
     chosen = {name: getattr(headline, name) for name in choices()}
-    if headline.features == "raw":
-        chosen["features"] = "centred"
-    control = scoring.judge.untrained().centred_on([real], [headline.tap], **chosen)
+    control = scoring.judge.untrained()
+    if headline.needs_centre:
+        control = control.centred_on([real], [headline.tap], **chosen)
     metric = EventQualityScore(control, chunk_windows=scoring.metric.chunk_windows, **chosen)
     found = metric.score(real, candidates, start_us=start_us, stop_us=stop_us)
     return [by_reading[metric.reading.name].score for by_reading in found]

@@ -13,7 +13,7 @@ from omegaconf import DictConfig
 from eqs.data import Dataset
 from eqs.events import EventReader
 from eqs.metrics import EventQualityScore, Judge, Reading, StreamScore
-from eqs.metrics.definition import choices
+from eqs.metrics.definition import VERSION_1, Definition, choices
 from eqs.metrics.features import require_taps
 from eqs.metrics.scoring import Watcher
 from eqs.pipelines.judge import (
@@ -25,6 +25,7 @@ from eqs.pipelines.judge import (
 )
 
 log = logging.getLogger(__name__)
+POOLING = ("patch", "patch_size", "pooling")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,22 +78,26 @@ def find_scoring(cfg: DictConfig, data: Dataset | None) -> Scoring:
     judge, folder, training, given = find_judge(cfg, data)
     judge.to(device)
     chosen = {name: cfg.eqs[name] for name in choices() if cfg.eqs[name] is not None}
-    definition = judge.define(**chosen)
+    headline = judge.define(**chosen)
     beside = kept_taps(judge) if cfg.taps is None else cfg.taps
-    taps = list(dict.fromkeys([definition.tap, *beside]))
+    taps = list(dict.fromkeys([headline.tap, *beside]))
     require_taps(judge.backbone, taps)
     content = training_content(training)
 
-    def lacks(tap: str) -> bool:
-        centre = judge.centre_for(replace(definition, tap=tap))
+    def lacks(definition: Definition) -> bool:
+        centre = judge.centre_for(definition)
         if centre is None or centre.sha256 in given or not content:
             return centre is None
         return centre.recordings != content
 
-    missing = [tap for tap in taps if lacks(tap)]
-    if missing and training is not None:
+    wanted = [each for each in definitions_of(headline, taps) if each.needs_centre and lacks(each)]
+    if wanted and training is not None:
         log.info("centring the judge on the training recordings of %s", training.name)
-        judge = centred(judge, training, missing, cfg.eqs.chunk_windows, chosen)
+        for pooled in dict.fromkeys(each.maps._replace(tap="") for each in wanted):
+            some = [each for each in wanted if each.maps._replace(tap="") == pooled]
+            pooling = {name: getattr(some[0], name) for name in POOLING}
+            of_taps = list(dict.fromkeys(each.tap for each in some))
+            judge = centred(judge, training, of_taps, cfg.eqs.chunk_windows, {**chosen, **pooling})
         judge.save(folder)
     # Partial, since Hydra would take the judge for a configuration and open it.
     metric = instantiate(cfg.eqs, judge=None, _partial_=True)(judge=judge).to(device)
@@ -100,19 +105,26 @@ def find_scoring(cfg: DictConfig, data: Dataset | None) -> Scoring:
 
 
 def readings_of(metric: EventQualityScore, taps: Sequence[str]) -> tuple[Reading, ...]:
-    """The metric's own reading, then every tap raw and, where there are centres, otherwise too."""
-    judge, headline = metric.judge, metric.reading.definition
-    kinds = ["raw", *sorted({"centred", headline.features} - {"raw"})]
-    readings = []
-    for features in kinds:
-        for tap in taps:
-            definition = replace(headline, tap=tap, features=features)
-            centre = None if features == "raw" else judge.centre_for(definition)
-            if features == "raw" or centre is not None:
-                readings.append(Reading(definition=definition, centre=centre))
+    """Those of `definitions_of` for which the metric's judge has what they need."""
+    judge, readings = metric.judge, [metric.reading]
+    for definition in definitions_of(metric.definition, taps)[1:]:
+        centre = judge.centre_for(definition) if definition.needs_centre else None
+        if not definition.needs_centre or centre is not None:
+            readings.append(Reading(definition=definition, centre=centre))
+    return tuple(readings)
 
-    def distance_to_headline(reading: Reading) -> tuple[bool, bool]:
-        chosen = reading.definition
-        return chosen.tap != headline.tap, chosen.features != headline.features
 
-    return tuple(sorted(readings, key=distance_to_headline))
+def definitions_of(headline: Definition, taps: Sequence[str]) -> list[Definition]:
+    """What stands beside a headline: the same of other activations, and what earlier scores were.
+
+    These are the centred cosine of version 1 and the raw cosine that the paper's formulas say.
+
+    Convention: whatever has the headline's tap and features is the headline itself.
+    """
+    like = [replace(headline, tap=tap) for tap in taps]
+    version_1 = [replace(each, **VERSION_1) for each in like]
+    raw = [replace(each, features="raw") for each in version_1]
+    by_column = {each.column: each for each in [headline, *like, *version_1, *raw]}
+    by_column[headline.column] = headline
+    order = sorted(by_column.values(), key=lambda each: each.tap != headline.tap)
+    return sorted(order, key=lambda each: each.column != headline.column)

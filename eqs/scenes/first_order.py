@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,16 @@ class FirstOrderSensor(EventSensor):
     Source: synchronous row scan and pixel without handshake as in Son et al., ISSCC 2017;
     configs/sensor/first_order.yaml says where every number comes from.
     """
+
+    scales: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "contrast": {"threshold_on_log": 1, "threshold_off_log": 1},
+        "balance": {"threshold_on_log": -1, "threshold_off_log": 1},
+        "slowness": {"bias_time_us": 1, "dim_time_us_lux": 1},
+        "noise": {"noise_log": 1},
+        "leak": {"leak_log_per_s": 1},
+        "hot_pixels": {"hot_pixel_fraction": 1},
+        "mismatch": {"threshold_mismatch_log": 1},
+    }
 
     threshold_on_log: float = 0.18
     threshold_off_log: float = 0.20

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +57,20 @@ class ReferenceSensor(EventSensor):
     et al. 2008) used by Low and Lee 2024; configs/sensor/reference_sensor.yaml says where every
     number comes from.
     """
+
+    scales: ClassVar[Mapping[str, Mapping[str, float]]] = {
+        "contrast": {"threshold_on_log": 1, "threshold_off_log": 1},
+        "balance": {"threshold_on_log": -1, "threshold_off_log": 1},
+        "slowness": {
+            "photodiode_capacitance_ff": 1, "miller_capacitance_ff": 1, "amplifier_time_us": 1,
+        },
+        "noise": {"shot_noise_factor": 2},  # a power: so many times the standard deviation
+        "leak": {"leak_hz": 1, "leak_hz_per_klux": 1},
+        "hot_pixels": {"hot_pixel_fraction": 1},
+        "mismatch": {"threshold_mismatch_log": 1},
+        "refractory": {"refractory_us": 1},
+        "jitter": {"jitter_us": 1, "latency_us": 1},
+    }  # fmt: skip
 
     threshold_on_log: float = 0.223
     threshold_off_log: float = 0.223

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +24,25 @@ class EventSensor:
         seed: draws the fixed pattern of mismatch; one seed is one sensor.
     """
 
+    scales: ClassVar[Mapping[str, Mapping[str, float]]] = {}
+    """What one can have more or less of: by its name, parameters and the powers they go with."""
+
     step_us: int = 1000
     seed: int = 0
+
+    def scaled(self, quantity: str, factor: float) -> Self:
+        """The same camera with so many times of something, one of `scales`.
+
+        Example:
+            >>> from eqs.scenes import ReferenceSensor
+            >>> ReferenceSensor().scaled("contrast", 2.0).threshold_on_log
+            0.446
+        """
+        powers = self.scales[quantity].items()
+        changed: dict[str, Any] = {
+            name: getattr(self, name) * factor**power for name, power in powers
+        }
+        return replace(self, **changed)
 
     def definition_hash(self) -> str:
         """Twelve hexadecimal digits that change with any parameter."""

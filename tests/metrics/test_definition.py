@@ -10,6 +10,7 @@ from eqs.metrics.definition import FIXED_RULES
 OTHER = {
     "tap": "gate",
     "features": "centred",
+    "distance": "cosine",
     "stages": (1, 2),
     "patch": "grid",
     "patch_size": 2,
@@ -44,7 +45,7 @@ def test_no_fixed_rule_hides_a_choice():
 
 def test_fixed_rules_are_part_of_the_hash(monkeypatch):
     before = Definition().hash
-    monkeypatch.setitem(FIXED_RULES, "distance", "another")
+    monkeypatch.setitem(FIXED_RULES, "version", "another")
     assert Definition().hash != before
 
 
@@ -64,7 +65,7 @@ def test_warmup_is_at_most_a_quarter(windows, warmup):
             {"patch_size": "three"},
             "patch_size to be a whole number .*got 'three'; set eqs.patch_size",
         ),
-        ({"features": "white"}, "features raw or centred or whitened, got 'white'"),
+        ({"features": "white"}, "features raw or silence or centred or whitened, got 'white'"),
         ({"counts": "none"}, "counts raw or normalised, got 'none'; set eqs.counts"),
         ({"span": "all"}, "span window or events"),
         ({"patch": "hex"}, "patch cells or grid, got 'hex'; set eqs.patch"),

@@ -21,14 +21,21 @@ from eqs.metrics import (
     whitening_matrix,
 )
 from eqs.metrics.definition import kinds
+from eqs.metrics.silence import Silence
 
-BASE = Definition(bins=2, window_us=50_000)
+PAPER = {"features": "raw", "distance": "cosine", "patch_size": 3}
+BASE = Definition(bins=2, window_us=50_000, **PAPER)
+HEADLINE = Definition(bins=2)
 TAPS = ("gate", "hidden", "downsample")
 
 
 def readings(*taps, centres=None):
-    raw = [Reading(definition=replace(BASE, tap=tap)) for tap in taps]
-    return raw + [
+    plain = [
+        Reading(definition=each)
+        for tap in taps
+        for each in (replace(BASE, tap=tap), replace(HEADLINE, tap=tap))
+    ]
+    return plain + [
         Reading(definition=replace(BASE, tap=tap, features=features), centre=centre)
         for tap, centre in (centres or {}).items()
         for features in ("centred", "whitened")
@@ -70,7 +77,7 @@ def test_a_watcher_sees_every_window_that_counts(backbone, make_events, chunk_wi
         [make_events(2), make_events(3)],
         [Reading(definition=definition)],
         chunk_windows=chunk_windows,
-        watch=lambda pooled: seen.append(pooled["hidden"][0]),
+        watch=lambda pooled: seen.append(pooled[definition.maps][0]),
     )
     windows = sum(len(stage) for stage in seen)
     assert windows == 19 - definition.warmup_of(19)
@@ -221,7 +228,7 @@ def test_normalised_counts_leave_the_number_of_events_out(backbone):
     ],
 )
 def test_identity_symmetry_and_chunks_of_other_choices(backbone, make_events, other):
-    definition = replace(BASE, features="centred", **other)
+    definition = replace(BASE, **{"features": "centred", **other})
     a, b = make_events(1), make_events(2, count=1500)
     centre = feature_centres(backbone, [make_events(11)], taps=["hidden"], definition=definition)
     ways = [Reading(definition=definition, centre=centre["hidden"])]
@@ -295,8 +302,11 @@ def test_scoring_leaves_no_trace_on_the_backbone(backbone, make_events):
 
 def test_one_reference_pass_serves_all(backbone, make_events):
     candidates = [make_events(seed) for seed in range(2, 6)]
-    score_streams(backbone, make_events(1), candidates, readings(*TAPS), chunk_windows=100)
+    ways = [each for each in readings(*TAPS) if each.definition.features == "raw"]
+    score_streams(backbone, make_events(1), candidates, ways, chunk_windows=100)
     assert backbone.calls == 1
+    score_streams(backbone, make_events(1), candidates, readings(*TAPS), chunk_windows=100)
+    assert backbone.calls == 3  # and one more of silence
 
 
 def test_a_late_simulator_is_scored_as_silent_and_not_over_what_is_left(backbone, make_events):
@@ -305,7 +315,7 @@ def test_a_late_simulator_is_scored_as_silent_and_not_over_what_is_left(backbone
     metric = EventQualityScore(Judge.of(backbone, bins=2))
     metric.update(late, real)
     assert len(metric.last.curve) == 19
-    assert metric.last.curve[:9].max() < metric.last.curve[12:].min()
+    assert np.nanmax(metric.last.curve[:9]) < metric.last.curve[12:].min()
     whole = metric.last.score
     metric.update(late, real, 500_000, 1_000_000)
     assert metric.last.score == pytest.approx(1, abs=1e-6)
@@ -322,11 +332,12 @@ def test_a_stated_span_narrows_what_is_scored(backbone, make_events):
     assert len(stated) == 8
 
 
-@pytest.mark.parametrize("features", ["raw", "centred", "whitened"])
+@pytest.mark.parametrize("features", ["raw", "silence", "centred", "whitened"])
 @pytest.mark.parametrize("mask", ["none", "active"])
 def test_the_loss_is_the_distance_and_has_gradients(backbone, make_events, features, mask):
     judge = Judge.of(backbone, bins=2).centred_on([make_events(11), make_events(12)])
-    metric = EventQualityScore(judge, features=features, mask=mask, warmup_windows=2)
+    chosen = {"features": features, "mask": mask, "patch_size": 3, "warmup_windows": 2}
+    metric = EventQualityScore(judge, **chosen)
     real, simulated = torch.randint(0, 4, (2, 9, 4, 16, 24)).float()
     simulated.requires_grad_()
     loss = metric.loss(simulated, real)
@@ -375,9 +386,9 @@ def test_silence_has_a_documented_score(backbone, make_events):
     metric = EventQualityScore(Judge.of(backbone, bins=2))
     empty = Events.empty(20, 28)
     metric.update(empty, make_events(1))
-    assert -1 <= metric.last.score < 0.99
+    assert metric.last.score == pytest.approx(0, abs=1e-6)
     metric.update(empty, empty, 0, 200_000)
-    assert metric.last.score == pytest.approx(1, abs=1e-6)
+    assert metric.last.score == 1
 
 
 def test_refusals_of_the_metric(backbone, make_events, tmp_path):
@@ -413,8 +424,11 @@ def test_broken_weights_are_never_a_silent_nan(backbone, make_events):
 
 
 def test_readings_must_share_a_pass(backbone, make_events):
-    ways = [*readings("gate"), Reading(definition=replace(BASE, patch_size=2))]
-    with pytest.raises(ValueError, match="differ in tap or features"):
+    ways = [*readings("gate"), Reading(definition=replace(BASE, state="reset"))]
+    with pytest.raises(ValueError, match="differ in tap, features, distance, patch, patch_size"):
+        score_streams(backbone, make_events(1), [make_events(2)], ways)
+    ways = [*readings("gate"), Reading(definition=replace(BASE, tap="gate", patch_size=2))]
+    with pytest.raises(ValueError, match="of different names"):
         score_streams(backbone, make_events(1), [make_events(2)], ways)
 
 
@@ -529,3 +543,69 @@ def test_centre_of_fewer_stages_is_refused(backbone, make_events, centres):
 def test_centres_need_a_recording(backbone):
     with pytest.raises(ValueError, match="at least one real recording"):
         feature_centres(backbone, [], taps=["hidden"], definition=BASE)
+
+
+def test_the_headline_is_the_agreement_of_what_silence_leaves(backbone):
+    real, simulated = torch.randint(0, 4, (2, 9, 4, 16, 24)).to(torch.uint8)
+    (scores,) = score_streams(
+        backbone, real, [simulated], [Reading(definition=HEADLINE)], chunk_windows=4
+    )
+    streams = torch.stack([real, simulated, torch.zeros_like(real)], dim=1).float()
+    maps, _ = backbone.taps(streams, None)
+    by_stage = []
+    for stage in maps["hidden"]:
+        a, b = (stage[2:, k].double() - stage[2:, 2].double() for k in (0, 1))
+        products = 2 * (a * b).sum(dim=(1, 2, 3))
+        by_stage.append((products / (a * a + b * b).sum(dim=(1, 2, 3))).mean().item())
+    score = scores["hidden_silence"]
+    assert score.by_stage == pytest.approx(by_stage, abs=1e-6)
+    assert score.curve[2:].mean() == pytest.approx(score.score, abs=1e-12)
+    assert score.patch_px == 2
+    assert score.map.shape == (8, 12)
+
+
+def test_the_response_to_silence_is_that_of_the_last_of_the_warm_up_from_then_on(backbone):
+    real, simulated = torch.randint(0, 4, (2, 16, 4, 16, 24)).to(torch.uint8)
+    definition = replace(HEADLINE, warmup_windows=3)
+    responses = Silence(backbone).responses([definition], (16, 24), 0, 16)[definition.maps]
+    for stage in responses:
+        assert len(stage) == 16
+        assert (stage[3] == stage[3:]).all()
+        assert not torch.equal(stage[2], stage[3])
+    late = Silence(backbone).responses([definition], (16, 24), 2, 5)[definition.maps]
+    torch.testing.assert_close(late[0], responses[0][2:7])
+    (scores,) = score_streams(backbone, real, [simulated], [Reading(definition=definition)])
+    assert scores["hidden_silence"].warmup == 3
+
+
+def test_more_of_everything_is_seen(backbone):
+    """Features twice as far from silence have the same direction, but agree less."""
+
+    class Louder:
+        """The second stream moves the state, from where silence leaves it, twice as far."""
+
+        strides = backbone.strides
+
+        def taps(self, x, states, stages, names):
+            maps, states = backbone.taps(x, states, stages=stages, names=names)
+            quiet, _ = backbone.taps(torch.zeros_like(x), None, stages=stages, names=names)
+            for stage, silent in zip(maps["hidden"], quiet["hidden"], strict=True):
+                stage[:, 1:] = silent[:, 1:] + 2 * (stage[:, 1:] - silent[:, 1:])
+            return maps, states
+
+    real = torch.randint(0, 4, (8, 4, 16, 24)).to(torch.uint8)
+    ways = [Reading(definition=HEADLINE)]
+    with torch.no_grad():
+        (scores,) = score_streams(Louder(), real, [real], ways)
+    assert scores["hidden_silence"].score == pytest.approx(0.8, abs=1e-6)
+
+
+def test_windows_in_which_both_are_silent_do_not_count(backbone):
+    real, simulated = torch.randint(0, 4, (2, 6, 4, 16, 24)).to(torch.uint8)
+    real[:3] = simulated[:3] = 0
+    definition = replace(HEADLINE, warmup_windows=0, state="reset")
+    (scores,) = score_streams(backbone, real, [simulated], [Reading(definition=definition)])
+    found = scores["hidden_silence"]
+    assert np.isnan(found.curve).tolist() == [True] * 3 + [False] * 3
+    (alone,) = score_streams(backbone, real[3:], [simulated[3:]], [Reading(definition=definition)])
+    assert found.score == pytest.approx(alone["hidden_silence"].score, abs=1e-6)

@@ -8,6 +8,8 @@ import pytest
 import torch
 
 from eqs.metrics import EventQualityScore, Judge, weights_sha256
+from eqs.metrics.definition import VERSION_1
+from eqs.metrics.judge import place_of, shipped
 from eqs.models import RVTDetector
 
 TINY = {"size": "tiny", "partition_split_32": 1}
@@ -39,11 +41,12 @@ def test_a_folder_gives_the_judge_back(judge, make_events, tmp_path):
     judge.save(tmp_path)
     loaded = Judge.load(tmp_path)
     assert loaded.definition == judge.definition
-    assert loaded.definition.features == "centred"
+    assert loaded.definition.features == "silence"
     assert loaded.weights_sha256 == judge.weights_sha256 == weights_sha256(loaded.backbone)
     assert [each.sha256 for each in loaded.centres] == [each.sha256 for each in judge.centres]
     for tap in ("hidden", "gate"):
-        before, after = (scores_of(each, make_events, tap=tap) for each in (judge, tmp_path))
+        chosen = {"tap": tap, **VERSION_1}
+        before, after = (scores_of(each, make_events, **chosen) for each in (judge, tmp_path))
         np.testing.assert_array_equal(before.curve, after.curve)
 
 
@@ -56,9 +59,12 @@ def test_the_weights_of_a_run_are_kept_and_are_the_judge(judge, detector, make_e
 
 
 def test_a_centre_is_one_part_of_several(judge, make_events):
-    raw = replace(judge, centres=(), definition=replace(judge.definition, features="raw"))
-    assert raw.reading().name == "hidden_raw"
-    assert scores_of(raw, make_events).score > scores_of(judge, make_events).score
+    raw = replace(judge, centres=())
+    assert raw.reading().name == judge.reading().name == "hidden_silence"
+    assert scores_of(raw, make_events).score == scores_of(judge, make_events).score
+    centred = scores_of(judge, make_events, **VERSION_1)
+    plain = scores_of(judge, make_events, **{**VERSION_1, "features": "raw"})
+    assert plain.score > centred.score
     recordings = [make_events(seed, height=32, width=32) for seed in (1, 2)]
     again = raw.centred_on(recordings)
     assert again.centres[0].sha256 == judge.centres[0].sha256
@@ -72,16 +78,40 @@ def test_centres_of_other_pooling_stand_beside_the_first(judge, make_events, tmp
     both.save(tmp_path)
     loaded = Judge.load(tmp_path)
     assert len(loaded.centres) == 3
-    assert loaded.reading(patch_size=2).centre.sha256 == both.reading(patch_size=2).centre.sha256
+    chosen = {**VERSION_1, "patch_size": 2}
+    assert loaded.reading(**chosen).centre.sha256 == both.reading(**chosen).centre.sha256
     with pytest.raises(ValueError, match="pooled and binned as chosen, for centred features"):
-        judge.reading(patch_size=2)
+        judge.reading(**chosen)
 
 
 def test_the_untrained_control_has_the_same_shape(judge):
     control = judge.untrained()
     assert control.network == judge.network
     assert control.weights_sha256 == Judge.random(**TINY).weights_sha256 != judge.weights_sha256
-    assert control.definition == replace(judge.definition, features="raw")
+    assert control.definition == judge.definition
+
+
+def test_a_shortened_judge_scores_as_the_whole_one(detector, make_events, tmp_path):
+    whole = Judge.from_checkpoint(detector, 1)
+    for parameter in whole.backbone.parameters():
+        parameter.data = parameter.data.half().float()
+    short = Judge.shortened(whole.backbone, "the first stages")
+    assert len(short.backbone.stages) == 3
+    short.save(tmp_path)
+    assert (tmp_path / "weights.ckpt").stat().st_size < 0.2 * detector.stat().st_size
+    loaded = Judge.load(tmp_path)
+    assert loaded.weights_sha256 == short.weights_sha256
+    scores = [scores_of(each, make_events).score for each in (whole, loaded)]
+    assert scores[0] == pytest.approx(scores[1], abs=1e-6)
+
+
+def test_the_package_brings_a_judge():
+    (name,) = shipped()
+    judge = Judge.load(name)
+    assert len(judge.backbone.stages) == 3
+    assert judge.reading().name == "hidden_silence"
+    files = place_of(name).iterdir()
+    assert sum(path.stat().st_size for path in files) < 6e6
 
 
 def test_the_hash_sees_values_and_names():

@@ -1,5 +1,6 @@
 """The metric's configuration files build what they say and offer every choice there is."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,10 +9,11 @@ from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 
 from eqs.metrics import Definition, Judge
-from eqs.metrics.definition import choices, kinds
+from eqs.metrics.definition import VERSION_1, choices, kinds
 
 CONFIGS = Path(__file__).parents[2] / "eqs/configs"
-HEADLINE = Definition(features="centred")
+HEADLINE = Definition()
+PAPER = {"features": "raw", "distance": "cosine", "patch_size": 3}
 
 
 def build(name, *overrides, judge="random"):
@@ -22,7 +24,7 @@ def build(name, *overrides, judge="random"):
 
 def test_the_paper_s_reading_is_the_raw_gate():
     metric = build("eqs_paper")
-    assert metric.definition == Definition(tap="gate", architecture="rvt-small-split2")
+    assert metric.definition == Definition(tap="gate", **PAPER, architecture="rvt-small-split2")
 
 
 def test_without_choices_the_judge_decides(make_events, tmp_path):
@@ -30,9 +32,19 @@ def test_without_choices_the_judge_decides(make_events, tmp_path):
     judge = Judge.random(size="tiny").centred_on(recordings)
     judge.save(tmp_path)
     metric = build("eqs", judge=str(tmp_path))
-    assert metric.definition == Definition(features="centred", architecture="rvt-tiny-split2")
+    assert metric.definition == Definition(architecture="rvt-tiny-split2")
     chosen = build("eqs", "eqs.stages=[1,2]", "eqs.features=raw", judge=str(tmp_path))
-    assert chosen.definition == Definition(stages=(1, 2), architecture="rvt-tiny-split2")
+    assert chosen.definition == Definition(
+        stages=(1, 2), features="raw", architecture="rvt-tiny-split2"
+    )
+
+
+def test_version_1_is_the_centred_cosine(make_events, tmp_path):
+    recordings = [make_events(seed, height=32, width=32) for seed in (1, 2)]
+    judge = Judge.random(size="tiny").centred_on(recordings)
+    judge.save(tmp_path)
+    metric = build("eqs_1", judge=str(tmp_path))
+    assert metric.definition == replace(Definition(architecture="rvt-tiny-split2"), **VERSION_1)
 
 
 @pytest.mark.parametrize("name", choices())

@@ -8,6 +8,8 @@ import torch
 from torch import Tensor, nn
 from torchmetrics.image.fid import FrechetInceptionDistance
 
+from eqs.metrics.definition import Maps
+
 
 class FeatureFrechet:
     """Fréchet distance between the features of real and of simulated streams.
@@ -19,22 +21,22 @@ class FeatureFrechet:
     It is a watcher of `eqs.metrics.score_streams`, so it costs no further pass of the network.
 
     Args:
-        tap: activation whose features are compared.
+        maps: activation whose features are compared, and how they are pooled.
 
     Source: Heusel et al., "GANs trained by a two time-scale update rule", NeurIPS 2017, with the
     judge in place of Inception.
     """
 
-    def __init__(self, tap: str) -> None:
+    def __init__(self, maps: Maps) -> None:
         """Start without features."""
-        self.tap = tap
+        self.maps = maps
         self._distances: list[list[FrechetInceptionDistance]] = []
 
-    def __call__(self, pooled: Mapping[str, Sequence[Tensor]]) -> None:
+    def __call__(self, pooled: Mapping[Maps, Sequence[Tensor]]) -> None:
         """Add the features of some windows, the real stream first."""
         samples = [
             [stream.movedim(1, -1).flatten(0, 2) for stream in stage.unbind(1)]
-            for stage in pooled[self.tap]
+            for stage in pooled[self.maps]
         ]
         if not self._distances:
             self._distances = [
