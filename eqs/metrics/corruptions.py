@@ -134,6 +134,29 @@ def on_clock_of(other: Events, start_us: int, stop_us: int) -> Events:
     return Events.concatenate(parts or [blank(other)]).window(start_us, stop_us)
 
 
+def elsewhere(events: Events, start_us: int, stop_us: int) -> Events:
+    """The same recording as another scene, whose texture and noise stay while no edge does.
+
+    Convention: it is mirrored, moved by half the width and half the height, what leaves the sensor
+    coming in on the other side, and played from the middle of the stretch on.
+
+    Args:
+        events: a recording.
+        start_us: start of the stretch.
+        stop_us: end of the stretch.
+    """
+    inside = events.window(start_us, stop_us)
+    half = (stop_us - start_us) // 2
+    first, second = (
+        inside.window(start_us, start_us + half),
+        inside.window(start_us + half, stop_us),
+    )
+    turned = Events.concatenate([second.shifted(-half), first.shifted(stop_us - start_us - half)])
+    x = (events.width - 1 - turned.x.astype(np.int64) + events.width // 2) % events.width
+    y = (turned.y.astype(np.int64) + events.height // 2) % events.height
+    return _replace(turned, x=x.astype(np.uint16), y=y.astype(np.uint16))
+
+
 def jittered_in_time(events: Events, sigma_us: float, *, seed: int = 0, key: str = "") -> Events:
     """Every time moved by normal noise, and the stream put in order again."""
     noise = _generator(seed, "jitter in time", key).normal(0.0, sigma_us, len(events))

@@ -123,6 +123,7 @@ class EventQualityScore(Metric):
         start_us: int | None = None,
         stop_us: int | None = None,
         watch: Watcher | None = None,
+        keep: Sequence[int] = (),
     ) -> list[dict[str, StreamScore]]:
         """Score several streams against one, which runs through the judge once; nothing is kept.
 
@@ -134,6 +135,7 @@ class EventQualityScore(Metric):
             start_us: start of the first window; by default see `window_starts`.
             stop_us: time that no window may pass; by default see `window_starts`.
             watch: sees the features of every window that counts.
+            keep: numbers of windows whose maps are kept.
 
         Returns:
             For each candidate the scores by name of the reading.
@@ -151,6 +153,7 @@ class EventQualityScore(Metric):
             chunk_windows=self.chunk_windows,
             silence=self._silence(),
             watch=watch,
+            keep=keep,
             device=self.judge.device,
         )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -35,6 +35,7 @@ class StreamScore:
         patch_px: side of a patch of the map in pixels; None where the map is cut evenly.
         curve: score of every window, warm-up included, shape (windows,); NaN where no patch counts.
         warmup: windows at the start that do not count.
+        window_maps: maps of the windows that were asked for, by their number.
     """
 
     score: float
@@ -43,6 +44,7 @@ class StreamScore:
     patch_px: int | None
     curve: NDArray[np.float64]
     warmup: int
+    window_maps: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
 
     @property
     def distance(self) -> float:
@@ -63,6 +65,7 @@ def score_group(
     *,
     silence: Silence | None = None,
     watch: Watcher | None = None,
+    keep: Sequence[int] = (),
     device: torch.device | str = "cpu",
 ) -> list[dict[str, StreamScore]]:
     """Score many streams against one reference, under many readings, in one pass.
@@ -78,6 +81,7 @@ def score_group(
         readings: readings that share one pass, see `Definition.one_pass`.
         silence: the judge's responses to nothing, as far as they are known.
         watch: sees the same features.
+        keep: numbers of windows whose maps are kept.
         device: where the backbone lives.
 
     Returns:
@@ -92,7 +96,7 @@ def score_group(
     listening = [each for each in definitions if each.features == "silence"]
     strides = strides_of(backbone, first.stages)
     skip, done = first.warmup_of(n_windows), 0
-    totals = {reading.name: _Tally(reading, skip, strides) for reading in readings}
+    totals = {reading.name: _Tally(reading, skip, strides, keep) for reading in readings}
     for chunk, pooled in paired(backbone, chunks, definitions, device):
         (height, width), windows = chunk.shape[-2:], len(chunk)
         silent = {}
@@ -121,6 +125,7 @@ def score_streams(
     chunk_windows: int | None = None,
     silence: Silence | None = None,
     watch: Watcher | None = None,
+    keep: Sequence[int] = (),
     device: torch.device | str = "cpu",
 ) -> list[dict[str, StreamScore]]:
     """Cut streams into their common windows and score the candidates against the reference.
@@ -135,6 +140,7 @@ def score_streams(
         chunk_windows: windows per pass; chosen from the sensor size if None.
         silence: the judge's responses to nothing, as far as they are known.
         watch: sees the same features.
+        keep: numbers of windows whose maps are kept.
         device: where the backbone lives.
 
     Returns:
@@ -151,7 +157,7 @@ def score_streams(
         chunk_windows=chunk_windows,
     )
     return score_group(
-        backbone, chunks, windows, readings, silence=silence, watch=watch, device=device
+        backbone, chunks, windows, readings, silence=silence, watch=watch, keep=keep, device=device
     )
 
 
@@ -227,9 +233,15 @@ def paired(
 class _Tally:
     """Running sums of one reading over the chunks of a group of streams."""
 
-    def __init__(self, reading: Reading, warmup: int, strides: Sequence[int]) -> None:
+    def __init__(
+        self, reading: Reading, warmup: int, strides: Sequence[int], keep: Sequence[int] = ()
+    ) -> None:
         self.comparison, self.definition = Comparison(reading), reading.definition
-        self.warmup, self.strides = warmup, strides
+        self.warmup, self.keep = warmup, frozenset(keep)
+        cells = self.definition.patch == "cells"
+        self.strides = strides if cells else [1] * len(strides)
+        self.patch_px = self.definition.patch_size * min(strides) if cells else None
+        self.windows, self.kept = 0, dict[int, Tensor]()
         self.curves: list[Tensor] = []
         self.sums: list[Tensor] = []
         """By stage, for every patch, the weighted similarities and the weights, summed."""
@@ -251,6 +263,13 @@ class _Tally:
             torch.stack([similarity * weight, weight])[:, skip:].sum(dim=1).cpu()
             for similarity, weight in found
         ]
+        for index in self.keep & {*range(self.windows, self.windows + len(curve))}:
+            here = [
+                torch.where(weight > 0, similarity, torch.nan)[index - self.windows].cpu()
+                for similarity, weight in found
+            ]
+            self.kept[index] = combine_maps(here, self.strides)
+        self.windows += len(curve)
         before = self.sums or [torch.zeros_like(stage) for stage in sums]
         self.sums = [a + b for a, b in zip(before, sums, strict=True)]
 
@@ -261,17 +280,16 @@ class _Tally:
         curve = torch.cat(self.curves)
         # Where no patch counts in any window both streams are silent, and silence equals silence.
         by_stage = curve[self.warmup :].nanmean(dim=0).nan_to_num(nan=1.0)
-        cells = self.definition.patch == "cells"
-        strides = self.strides if cells else [1] * len(self.strides)
-        image = combine_maps([total / windows for total, windows in self.sums], strides)
+        image = combine_maps([total / weight for total, weight in self.sums], self.strides)
         return [
             StreamScore(
                 score=float(by_stage[index].mean()),
                 by_stage=tuple(by_stage[index].tolist()),
                 map=image[index].numpy(),
-                patch_px=self.definition.patch_size * min(self.strides) if cells else None,
+                patch_px=self.patch_px,
                 curve=curve[:, index].mean(dim=-1).numpy(),
                 warmup=self.warmup,
+                window_maps={n: maps[index].numpy() for n, maps in sorted(self.kept.items())},
             )
             for index in range(curve.shape[1])
         ]

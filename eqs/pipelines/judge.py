@@ -18,6 +18,7 @@ from eqs.events import EventReader
 from eqs.files import short_hash
 from eqs.metrics import Judge
 from eqs.metrics.features import NAMED, tap_names
+from eqs.metrics.judge import place_of, shipped
 from eqs.metrics.judge_folder import RECORD
 from eqs.metrics.network import OwnNetwork
 from eqs.models import RVTDetector
@@ -49,23 +50,19 @@ class Found(NamedTuple):
 
 
 def require_judge(cfg: DictConfig) -> None:
-    """See that there will be a judge and a device, before there is a data set.
+    """See that the judge that is named, and the device, are there before there is a data set.
 
     Raises:
         FileNotFoundError: the named judge does not exist.
-        ValueError: none is named and no detector was trained on a real stream, or there is no such
-            device here.
+        ValueError: there is no such device here.
     """
     scoring_device(cfg.device)
     if isinstance(cfg.eqs.judge, DictConfig):
         class_of(cfg.eqs.judge, "eqs.judge")
-    elif cfg.eqs.judge not in (None, "random") and not Path(cfg.eqs.judge).exists():
-        raise FileNotFoundError(f"Expected a judge at {cfg.eqs.judge}, found none; set eqs.judge")
-    if cfg.eqs.judge is None and not trained_on_real(cfg):
-        raise ValueError(
-            "Expected a judge trained on real events, got none: type `python train.py sim=real` "
-            "first (with a detector that has taps, as RVT does), or set eqs.judge to a judge's "
-            "folder or a checkpoint"
+    elif cfg.eqs.judge not in (None, "random") and not place_of(cfg.eqs.judge).exists():
+        raise FileNotFoundError(
+            f"Expected a judge at {cfg.eqs.judge}, or the package's {', '.join(shipped())}, found "
+            "neither; set eqs.judge"
         )
 
 
@@ -108,18 +105,21 @@ def _shows_maps(settings: Mapping[str, Any]) -> bool:
 
 
 def find_judge(cfg: DictConfig, data: Dataset | None) -> Found:
-    """The judge that is named, or a detector trained on the real stream of this data.
+    """The judge that is named, else a detector trained on the real stream of this data.
 
     Of several detectors the one that followed the configured recipe on the data as they are is
-    taken, else the newest.
+    taken, else the newest; where there is none, the judge that comes with the package.
 
     Raises:
         FileNotFoundError: the named judge does not exist.
-        ValueError: none is named and no detector was trained on a real stream.
     """
     require_judge(cfg)
     if cfg.eqs.judge is not None:
         return _given_judge(cfg, data)
+    if not trained_on_real(cfg):
+        name = shipped()[0]
+        log.info("judge: %s, which comes with the package", name)
+        return Found(Judge.load(name), Path(cfg.paths.results) / f"judge-{name}", None)
     recipe, content = recipe_hash(cfg), None if data is None else data_hash(data)
     ranks = {
         (run.result.recipe == recipe, run.result.data == content, run.finished_ns): run
@@ -148,6 +148,8 @@ def _given_judge(cfg: DictConfig, data: Dataset | None) -> Found:
         judge = Judge.built(plain(cfg.eqs.judge))
         return _with_kept_centres(cfg, judge, data)
     judge = Judge.load(cfg.eqs.judge, cfg.eqs.partition_split_32)
+    if str(cfg.eqs.judge) in shipped():
+        return Found(judge, Path(cfg.paths.results) / f"judge-{cfg.eqs.judge}", None)
     place = Path(cfg.eqs.judge)
     run = Run(place if place.is_dir() else place.parent)
     if run.finished and (run.folder / RECORD).is_file():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import logging
-from dataclasses import dataclass
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -14,19 +14,20 @@ from rich.console import Console
 from rich.table import Table
 
 from eqs.events.bag import is_bag_folder
-from eqs.events.formats import open_events
 from eqs.extras import DISTRIBUTION
 from eqs.files import complete_file, read_json, write_json
 from eqs.metrics import StreamScore
 from eqs.metrics.grid import Grid, fewest_windows
-from eqs.metrics.windows import common_grid
+from eqs.pair import write_page
+from eqs.pair.nearest import sentence
 from eqs.pipelines.command import explained
-from eqs.pipelines.score import count_events, score_anchors
+from eqs.pipelines.pair import Pair, compare
 from eqs.pipelines.score_folders import score_folders
 from eqs.pipelines.scoring import Scoring, find_scoring
 
 log = logging.getLogger(__name__)
 
+PAGE = "score.html"
 FEW_WINDOWS = (
     "Few windows count (%d): a score of fewer than %d says little, with a warm-up cut short; give "
     "longer files"
@@ -35,27 +36,6 @@ UNKNOWN_SPAN = (
     "%s does not say from when to when its camera was watching, so the extent of the real file is "
     "scored; if the frames cover less, a study scores less: set start_us and stop_us to theirs"
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pair:
-    """What two files were found to be to each other.
-
-    Args:
-        grid: the windows that were compared.
-        scores: by reading.
-        anchors: scores by anchor and reading.
-        events: numbers of events in these windows.
-        watched_us: the span that the simulated file states.
-        size: rows and columns that were looked at.
-    """
-
-    grid: Grid
-    scores: dict[str, StreamScore]
-    anchors: dict[str, dict[str, float]]
-    events: dict[str, int]
-    watched_us: tuple[int, int] | None
-    size: tuple[int, int]
 
 
 @explained
@@ -87,7 +67,9 @@ def score_files(cfg: DictConfig) -> None:
     files = {"simulated": str(cfg.simulated), "real": str(cfg.real)}
     write_json(out / "score.json", files | record(pair, scoring))
     write_curve(out / "curve.csv", result, pair.grid.start_us, window_us)
+    write_pair_page(out / PAGE, files, pair, scoring)
     show(pair, scoring, Console())
+    log.info("page: %s", out / PAGE)
     fewest = fewest_windows(scoring.headline.definition.warmup_windows)
     if result.n_windows < fewest:
         log.warning(FEW_WINDOWS, result.n_windows, fewest)
@@ -100,27 +82,6 @@ def score_files(cfg: DictConfig) -> None:
         draw(out, result, window_us=window_us, ceiling=ceiling, size=pair.size)
 
 
-def compare(cfg: DictConfig, scoring: Scoring) -> Pair:
-    """Score the files over the windows that a study would cut."""
-    size, window_us = (cfg.height, cfg.width, cfg.rows), scoring.headline.definition.window_us
-    with (
-        open_events(cfg.real, *size) as real,
-        open_events(cfg.simulated, *size) as simulated,
-    ):
-        grid = common_grid([real, simulated], window_us, cfg.start_us, cfg.stop_us)
-        span = grid.start_us, grid.stop_us
-        (scores,) = scoring.score(real, [simulated], start_us=span[0], stop_us=span[1])
-        files = {"simulated": simulated, "real": real}
-        return Pair(
-            grid=grid,
-            scores=scores,
-            anchors=score_anchors(scoring, real, *span),
-            events={name: count_events(each, *span) for name, each in files.items()},
-            watched_us=simulated.span_us,
-            size=(real.height, real.width),
-        )
-
-
 def record(pair: Pair, scoring: Scoring) -> dict[str, Any]:
     """What `score.json` says of a pair."""
     result = pair.scores[scoring.headline.name]
@@ -129,6 +90,12 @@ def record(pair: Pair, scoring: Scoring) -> dict[str, Any]:
         "readings": {name: score.score for name, score in pair.scores.items()},
         "by_stage": list(result.by_stage),
         "anchors": pair.anchors,
+        "chance": pair.anchors["chance"][scoring.headline.name],
+        "chance_is": pair.chance,
+        "ceiling": pair.anchors["ceiling"][scoring.headline.name],
+        "blank": pair.anchors["blank"][scoring.headline.name],
+        "nearest": [each._asdict() for each in pair.nearest],
+        "diagnosis": [each._asdict() for each in pair.diagnosis.findings],
         "span_us": [pair.grid.start_us, pair.grid.stop_us],
         "windows": result.n_windows,
         "share": pair.grid.share,
@@ -173,9 +140,9 @@ def extent_line(grid: Grid, score: StreamScore) -> str:
 
 
 def show(pair: Pair, scoring: Scoring, console: Console) -> None:
-    """Print every reading beside its anchors, the headline first, and what was scored."""
+    """Print every reading beside its anchors, the headline first, and what it means."""
     table = Table(title="EQS (higher is better)")
-    chosen = ("ceiling", "thinned_50", "poisson", "blank")
+    chosen = ("ceiling", "thinned_50", "poisson", "chance", "blank")
     table.add_column("reading")
     for name in ("simulated", *chosen):
         table.add_column(name.replace("_", " "), justify="right")
@@ -183,10 +150,57 @@ def show(pair: Pair, scoring: Scoring, console: Console) -> None:
         values = [score.score, *(pair.anchors[name][reading] for name in chosen)]
         table.add_row(reading, *(f"{value:.3f}" for value in values))
     console.print(table)
-    console.print(extent_line(pair.grid, pair.scores[scoring.headline.name]))
-    console.print(
-        f"{pair.events['simulated']} simulated and {pair.events['real']} real events; "
-        f"judge: {scoring.judge.description} ({scoring.judge.weights_sha256[:12]})"
+    for line in lines(pair, scoring):
+        console.print(line, markup=False, highlight=False)
+
+
+def lines(pair: Pair, scoring: Scoring) -> list[str]:
+    """What a person wants to know, a sentence each."""
+    headline = scoring.headline
+    result = pair.scores[headline.name]
+    anchors = {name: values[headline.name] for name, values in pair.anchors.items()}
+    said = [
+        f"{headline.name}: {result.score:.3f}, between chance {anchors['chance']:.3f} and ceiling "
+        f"{anchors['ceiling']:.3f}; no events at all {anchors['blank']:.3f}",
+        f"chance is {pair.chance}; ceiling is the real one without a tenth of its events",
+        extent_line(pair.grid, result),
+        rate_line(pair),
+        f"judge: {scoring.judge.description} ({scoring.judge.weights_sha256[:12]})",
+    ]
+    if pair.nearest:
+        said.insert(1, sentence(pair.nearest, pair.nearest_score))
+    return said
+
+
+def rate_line(pair: Pair) -> str:
+    """Numbers of events, and their rates per pixel and second."""
+    seconds = 1e-6 * (pair.grid.stop_us - pair.grid.start_us)
+    pixels = pair.size[0] * pair.size[1]
+    simulated, real = (pair.events[name] for name in ("simulated", "real"))
+    ratio = f"{simulated / real:.2f} simulated events per real one" if real else "no real events"
+    return (
+        f"{simulated} simulated and {real} real events, {simulated / seconds / pixels:.2f} and "
+        f"{real / seconds / pixels:.2f} per pixel and second: {ratio}"
+    )
+
+
+def write_pair_page(path: Path, files: Mapping[str, str], pair: Pair, scoring: Scoring) -> None:
+    """Write the page with both streams side by side."""
+    headline = scoring.headline.name
+    result = pair.scores[headline]
+    names = [Path(files[each]).name for each in ("simulated", "real")]
+    write_page(
+        path,
+        title=f"{names[0]} beside {names[1]}: {result.score:.3f}",
+        lines=lines(pair, scoring),
+        curve=result.curve,
+        warmup=result.warmup,
+        window_us=pair.grid.window_us,
+        levels={name: pair.anchors[name][headline] for name in ("chance", "ceiling", "blank")},
+        windows=pair.windows,
+        diagnosis=pair.diagnosis,
+        nearest=[(each.words, each.score) for each in pair.nearest],
+        size=pair.size,
     )
 
 
@@ -198,7 +212,7 @@ def refuse_others(out: Path) -> None:
     """
     names = (
         "score.json", "curve.csv", "map.png", "map.svg", "curve.png", "curve.svg", "eqs.csv",
-        "anchors.csv", "report.html",
+        "anchors.csv", "report.html", PAGE,
     )  # fmt: skip
     there = [name for name in names if (out / name).exists()]
     record = out / "score.json"

@@ -58,10 +58,11 @@ class Scoring:
         start_us: int,
         stop_us: int,
         watch: Watcher | None = None,
+        keep: Sequence[int] = (),
     ) -> list[dict[str, StreamScore]]:
         """Every reading of every candidate, in one pass of the judge."""
         limits = {"start_us": start_us, "stop_us": stop_us}
-        return self.metric.score(real, candidates, self.readings, **limits, watch=watch)
+        return self.metric.score(real, candidates, self.readings, **limits, watch=watch, keep=keep)
 
 
 def find_scoring(cfg: DictConfig, data: Dataset | None) -> Scoring:

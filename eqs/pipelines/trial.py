@@ -48,11 +48,12 @@ def trial(cfg: DictConfig) -> None:
         ValueError: a judge, scene or sensor is not there.
     """
     torch.set_num_threads(1)
-    out, plain = Path(cfg.out), OmegaConf.to_container(cfg, resolve=True)
+    out = Path(cfg.out)
+    plain: Any = OmegaConf.to_container(cfg, resolve=True)
     means = {judge: means_of(cfg, judge, out) for judge in map(str, cfg.judges)}
     all_means = means | {judge: means_of(cfg, judge, out) for judge in map(str, cfg.controls)}
     jobs = [
-        Job(plain, half, sensor, scene, means if half == DEVELOPMENT else all_means)  # type: ignore[arg-type]
+        Job(plain, half, sensor, scene, means if half == DEVELOPMENT else all_means)
         for half, chosen in cfg.halves.items()
         for scene in cfg.scenes
         for sensor in chosen.sensors
@@ -60,7 +61,7 @@ def trial(cfg: DictConfig) -> None:
     if cfg.real is not None:
         jobs += [
             Job(plain, "real", str(cfg.real), n, all_means) for n in real_names(Path(cfg.real))
-        ]  # type: ignore[arg-type]
+        ]
     found: list[Found] = []
     done = side_by_side(run_job, jobs, cfg.workers)
     for each in track(done, description="trial", total=len(jobs)):
@@ -237,15 +238,15 @@ def _joined(parts: Sequence[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]
 def means_of(cfg: DictConfig, name: str, out: Path) -> Path:
     """The file of a judge's mean real features, of the references of the development half."""
     judge = Judge.load(name)
-    plain = OmegaConf.to_container(cfg, resolve=True)
+    plain: Any = OmegaConf.to_container(cfg, resolve=True)
     named = ("seed", "size", "windows", "halves", "scenes", "worlds", "sensors")
-    key = short_hash([VERSION, judge.weights_sha256, *(dict(plain)[name] for name in named)])  # type: ignore[arg-type]
+    key = short_hash([VERSION, judge.weights_sha256, *(plain[name] for name in named)])
     path = out / f"means-{Path(name).name}-{key}.npz"
     if path.is_file():
         return path
     half = cfg.halves.development
     jobs = [
-        Job(plain, "development", sensor, scene, {})  # type: ignore[arg-type]
+        Job(plain, "development", sensor, scene, {})
         for scene in cfg.scenes
         for sensor in half.sensors
     ]

@@ -113,9 +113,16 @@ def scaled_score(
 
 
 def score_columns(table: pd.DataFrame) -> list[str]:
-    """The headline `eqs` and every variant column `eqs_<tap>_<raw|centred|whitened>` of a table."""
+    """The headline `eqs` and every variant column, `eqs_<tap>_<features>`, of a table."""
     variants = (name for name in table.columns if name.startswith("eqs_"))
-    return ["eqs", *(name for name in variants if name.endswith(("_raw", "_centred", "_whitened")))]
+    return [
+        "eqs",
+        *(
+            name
+            for name in variants
+            if name.endswith(("_raw", "_silence", "_centred", "_whitened"))
+        ),
+    ]
 
 
 def baseline_columns(table: pd.DataFrame) -> list[str]:

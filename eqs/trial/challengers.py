@@ -191,14 +191,16 @@ def blurred_counts(histograms: Tensor, bins: int, sigma_px: float) -> Tensor:
     """
     counts = histograms.float().unflatten(2, (2, -1, bins)).sum(dim=4).flatten(2, 3)
     rows, columns = (_gaussian(pixels, sigma_px) for pixels in counts.shape[-2:])
-    return rows @ counts @ columns
+    blurred: Tensor = rows @ counts @ columns
+    return blurred
 
 
 def _gaussian(pixels: int, sigma_px: float) -> Tensor:
     """The matrix that blurs so many pixels; what lies outside is dark."""
     at = torch.arange(pixels, dtype=torch.float32)
     weights = torch.exp(-0.5 * ((at[:, None] - at) / sigma_px) ** 2)
-    return weights / (sigma_px * (2 * torch.pi) ** 0.5)
+    matrix: Tensor = weights / (sigma_px * (2 * torch.pi) ** 0.5)
+    return matrix
 
 
 def of_counts(histograms: Tensor) -> dict[str, Tensor]:

@@ -11,6 +11,7 @@ from omegaconf import OmegaConf
 
 from eqs.events import EventReader
 from eqs.metrics import EventQualityScore, Judge
+from eqs.metrics.definition import VERSION_1
 from eqs.models import RVTDetector
 from eqs.pipelines import judge, scoring
 from eqs.pipelines.build import dataset
@@ -61,10 +62,10 @@ def test_else_the_newest_wins(chosen, finished, tmp_path):
     assert chosen() == wanted
 
 
-def test_detectors_of_simulated_streams_do_not_judge(chosen, finished, tmp_path):
+def test_without_a_detector_of_real_events_the_package_s_judge_judges(chosen, finished, tmp_path):
     finished(tmp_path, "a", simulator="esim")
-    with pytest.raises(ValueError, match="Expected a judge trained on real events, got none"):
-        chosen()
+    brought = chosen()
+    assert brought.weights_sha256 == Judge.load("varied").weights_sha256
 
 
 @pytest.mark.parametrize("target", ["torch.nn.Linear", "gone.Detector"])
@@ -81,14 +82,19 @@ def test_detectors_without_taps_do_not_judge(chosen, finished, tmp_path, target)
         ("raw", "hidden_raw hidden_centred gate_raw gate_centred"),
         (
             "whitened",
-            "hidden_whitened hidden_raw hidden_centred gate_whitened gate_raw gate_centred",
+            "hidden_whitened hidden_centred hidden_raw gate_whitened gate_centred gate_raw",
+        ),
+        (
+            "silence",
+            "hidden_silence hidden_centred hidden_raw gate_silence gate_centred gate_raw",
         ),
     ],
 )
 def test_whitened_readings_appear_when_asked_for(features, expected, make_events):
     recording = make_events(3000, 32, 32)
     trained = Judge.random(size="tiny").centred_on([recording], ["hidden", "gate"])
-    metric = EventQualityScore(trained, features=features)
+    chosen = {**VERSION_1, "features": features} if features != "silence" else {}
+    metric = EventQualityScore(trained, **chosen)
     readings = scoring.readings_of(metric, ["hidden", "gate"])
     assert [reading.name for reading in readings] == expected.split()
 
@@ -97,12 +103,16 @@ def test_a_given_folder_is_the_judge(tmp_path, make_events):
     Judge.random(size="tiny").centred_on([make_events(3000, 32, 32)]).save(tmp_path / "mine")
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose("evaluate", [f"eqs.judge={tmp_path / 'mine'}", f"paths.runs={tmp_path}"])
-        gate = compose("evaluate", [f"eqs.judge={tmp_path / 'mine'}", "eqs.tap=gate"])
+        gate = compose(
+            "evaluate", ["metric=eqs_1", f"eqs.judge={tmp_path / 'mine'}", "eqs.tap=gate"]
+        )
     found = scoring.find_scoring(cfg, None)
-    assert found.headline.name == "hidden_centred"
+    assert found.headline.name == "hidden_silence"
     assert found.judge.weights_sha256 == Judge.load(tmp_path / "mine").weights_sha256
     names = {reading.name for reading in found.readings}
-    assert names == {"hidden_centred", "hidden_raw", "gate_raw", "downsample_raw"}
+    taps = ("hidden", "gate", "downsample")
+    plain = {f"{tap}_{features}" for tap in taps for features in ("silence", "raw")}
+    assert names == {"hidden_centred", *plain}
     with pytest.raises(ValueError, match=r"centre of the activation gate.* set eqs\.judge, or"):
         scoring.find_scoring(gate, None)
 
@@ -127,10 +137,15 @@ def test_a_checkpoint_is_centred_on_the_training_recordings_and_kept(tmp_path, m
         cfg = compose("evaluate", given)
     found = scoring.find_scoring(cfg, dataset(cfg))
     (kept,) = (tmp_path / "results" / "dsec").glob("judge-*")
-    assert Judge.load(kept).reading().centre.sha256 == found.headline.centre.sha256
+    assert Judge.load(kept).reading(**VERSION_1).centre.sha256 == centre_of(found)
     shutil.rmtree(tmp_path / "data" / "train")
     again = scoring.find_scoring(cfg, None)
-    assert again.headline.centre.sha256 == found.headline.centre.sha256
+    assert centre_of(again) == centre_of(found)
+
+
+def centre_of(found):
+    (centred,) = (each for each in found.readings if each.name == "hidden_centred")
+    return centred.centre.sha256
 
 
 def test_centres_follow_the_recordings_they_were_computed_from(tmp_path, make_recording):
@@ -160,8 +175,7 @@ def test_centres_follow_the_recordings_they_were_computed_from(tmp_path, make_re
                         "data.splits={train: [train_*], val: [], test: [test_a]}",
                     ],
                 )
-            headline = scoring.find_scoring(cfg, dataset(cfg)).headline
-            found[judge_named, step] = headline.centre.sha256
+            found[judge_named, step] = centre_of(scoring.find_scoring(cfg, dataset(cfg)))
     assert found["some.ckpt", "half"] != found["some.ckpt", "whole"]
     assert found["some.ckpt", "whole"] == found["some.ckpt", "again"]
     assert len({found["published", step] for step in ("half", "whole", "again")}) == 1

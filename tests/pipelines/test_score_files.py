@@ -48,7 +48,7 @@ def test_counts_and_pooling_reach_the_score(files, tmp_path):
     for name, overrides in {
         "default": [],
         "counts": ["eqs.counts=normalised"],
-        "pooling": ["eqs.pooling=smooth"],
+        "pooling": ["eqs.pooling=smooth", "eqs.patch_size=2"],
     }.items():
         run(files[1], files[0], tmp_path / name, "taps=[]", *overrides)
         found[name] = json.loads((tmp_path / name / "score.json").read_text())
@@ -60,13 +60,43 @@ def test_files_beside_the_score(files, tmp_path):
     out = tmp_path / "out"
     run(files[1], files[0], out)
     found = json.loads((out / "score.json").read_text())
-    assert found["eqs"] < found["anchors"]["ceiling"]["hidden_raw"] < 1.0
+    assert found["eqs"] < found["anchors"]["ceiling"]["hidden_silence"] < 1.0
     with (out / "curve.csv").open() as file:
         rows = list(csv.DictReader(file))
     counted = [float(row["eqs"]) for row in rows if row["counts"] == "True"]
     assert len(counted) == found["windows"]
     assert np.mean(counted) == pytest.approx(found["eqs"], abs=1e-6)
     assert {path.name for path in out.glob("*.png")} == {"map.png", "curve.png"}
+    assert found["blank"] == pytest.approx(0.0, abs=1e-3)
+    assert found["blank"] < found["chance"] < found["ceiling"]
+    assert {"family", "grade", "score", "words"} == found["nearest"][0].keys()
+    rates = {line["name"]: line for line in found["diagnosis"]}["event rate"]
+    assert rates["simulated"] == pytest.approx(rates["real"], rel=0.05)
+    assert "mine" not in (page := (out / "score.html").read_text())
+    assert page.count("data:image/png") == 3 * 39
+
+
+def test_another_recording_may_lend_chance(files, tmp_path, make_events, caplog):
+    make_events(90_000, 64, 96, stop_us=2_000_000, seed=9).save(tmp_path / "other.h5")
+    found = result(files[1], files[0], tmp_path / "out", f"other={tmp_path / 'other.h5'}")
+    assert found["chance_is"].endswith("other.h5")
+    assert found["chance"] != result(files[1], files[0], tmp_path / "own")["chance"]
+    make_events(900, 32, 32, stop_us=2_000_000, seed=9).save(tmp_path / "small.h5")
+    with pytest.raises(SystemExit):
+        result(files[1], files[0], tmp_path / "no", f"other={tmp_path / 'small.h5'}")
+    assert "Expected another recording of 96x64 pixels, got one of 32x32" in caplog.messages[-1]
+
+
+def test_a_stream_is_as_far_as_the_damage_that_it_is(files, tmp_path, capsys):
+    real = Events.load(files[0])
+    keep = np.random.default_rng(0).random(len(real)) < 0.5
+    fields = {name: getattr(real, name)[keep] for name in "txyp"}
+    Events(**fields, height=64, width=96, span_us=real.extent_us).save(tmp_path / "half.h5")
+    found = result(tmp_path / "half.h5", files[0], tmp_path / "out")
+    dropped = next(each for each in found["nearest"] if each["family"] == "dropped")
+    assert dropped["grade"] == pytest.approx(0.5, abs=0.1)
+    assert "as far from real as:" in capsys.readouterr().out
+    assert result(files[1], files[0], tmp_path / "none", "nearest=false")["nearest"] == []
 
 
 def test_a_missing_file_ends_in_one_sentence(files, tmp_path, caplog):
@@ -151,7 +181,8 @@ def test_a_file_without_events_is_scored_as_silence(files, tmp_path, span_us):
     silence.save(tmp_path / "silence.h5")
     found = result(tmp_path / "silence.h5", files[0], tmp_path / "out")
     assert found["events"]["simulated"] == 0 < found["events"]["real"]
-    assert found["eqs"] == pytest.approx(found["anchors"]["blank"]["hidden_raw"], abs=1e-6)
+    assert found["eqs"] == pytest.approx(found["blank"], abs=1e-4)
+    assert found["eqs"] == pytest.approx(0.0, abs=1e-3)
     assert found["share"] > 0.95
 
 

@@ -206,7 +206,7 @@ def test_training_on_real_events_leaves_a_judge(place: Path, trained: dict[str, 
     folders = {run.result.simulator: run.folder for run in runs_of(place)}
     assert not (folders["esim"] / "judge.json").exists()
     judge = Judge.load(folders["real"])
-    assert judge.definition == Definition(features="centred", architecture="rvt-tiny-split1")
+    assert judge.definition == Definition(architecture="rvt-tiny-split1")
     assert {centre.tap for centre in judge.centres} == set(KEPT_TAPS)
     assert judge.description.endswith("of dsec_mini_smoke, a rendered world")
     (folders["real"] / "judge.json").unlink()  # as older runs have none

@@ -35,11 +35,13 @@ ROOMS = {
     "eqs.models": "kernels",
     "eqs.metrics.baselines": "events metrics",
     "eqs.metrics": "events extras files kernels models representations",
+    "eqs.pair": "events files metrics metrics.baselines",
+    "eqs.trial": "events files metrics scenes",
     "eqs.training": "content data drawing events files frames metrics models representations "
     "simulators.learned",
     "eqs.study": "drawing files names",
     "eqs.pipelines": "content data drawing events extras files frames metrics metrics.baselines "
-    "models names processors simulators simulators.learned study training",
+    "models names pair processors simulators simulators.learned study training trial",
     "eqs.benchmarks": "data events extras frames metrics models representations scenes simulators "
     "simulators.learned training",
     "eqs.commands": "benchmarks data drawing events extras files frames frames.networks pipelines",
