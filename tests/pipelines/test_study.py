@@ -231,7 +231,7 @@ def test_the_readme_s_snippet_gives_the_study_s_row(
     blocks = re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
     (snippet,) = (block for block in blocks if "EventQualityScore" in block)
     if reading == "eqs_paper":
-        snippet = snippet.replace('Score("judge")', 'Score("judge", tap="gate", features="raw")')
+        snippet = snippet.replace('Score("judge")', f'Score("judge", tap="gate", **{PAPER})')
     monkeypatch.chdir(tmp_path)
     Path("judge").symlink_to(run.folder)
     for recording in dataset(cfg).recordings("test"):
@@ -245,6 +245,9 @@ def test_the_readme_s_snippet_gives_the_study_s_row(
         assert f"tensor({made['score'].compute():.4f}" in capsys.readouterr().out
 
 
+PAPER = {"features": "raw", "distance": "cosine", "patch_size": 3}
+
+
 @pytest.mark.slow
 def test_the_study_is_written_down(place: Path, trained: dict[str, RunResult]) -> None:
     evaluate(configured(place, "score=true", "eqs.warmup_windows=1", name="evaluate"))
@@ -254,7 +257,7 @@ def test_the_study_is_written_down(place: Path, trained: dict[str, RunResult]) -
     assert sorted(set(scores["simulator"])) == ["esim", "pix2nvs", "v2e"]
     assert len(scores) == 3 * 2
     assert scores["eqs"].between(-1, 1).all()
-    assert scores["eqs"].equals(scores["eqs_hidden_centred"])
+    assert scores["eqs"].equals(scores["eqs_hidden_silence"])
     rivals = {f"baseline_{name}" for name in ("untrained_eqs", "frechet_distance")}
     assert rivals < set(study) & set(scores)
     assert study.set_index("simulator")["baseline_reverse_map"].notna()["esim"]
