@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -14,9 +14,10 @@ from torch import Tensor
 
 from eqs.benchmarks.timing import Cost, in_own_process, time_runs
 from eqs.events import Events
-from eqs.metrics import Definition, Judge, Reading, group_chunks, score_streams
+from eqs.metrics import Definition, Judge, Reading, TappedBackbone, group_chunks, score_streams
 from eqs.metrics.windows import chunk_length
 
+JUDGE: Final = "varied"
 STAGES: Final = (1, 2, 3)
 EVENTS_PER_SECOND: Final = 1_000_000
 MOST_IN_MEMORY: Final = 16  # windows of histograms; the ratio is one of times per window
@@ -40,6 +41,7 @@ class Job:
 LINES: Final = {
     "two passes of stages 1-3, from histograms": "passes",
     "score of a pair, from histograms": "score",
+    "the same with a network in bfloat16": "half",
     "score of a pair, from events": "events",
 }
 
@@ -79,7 +81,7 @@ def histograms(job: Job) -> list[Tensor]:
 
 def passes(job: Job) -> Callable[[], None]:
     """Each stream through the first stages, as many windows at a time as the score takes."""
-    backbone = Judge.random().backbone
+    backbone = Judge.load(JUDGE).backbone
     streams = histograms(job)
     length = chunk_length(2, *job.size)
 
@@ -96,8 +98,13 @@ def passes(job: Job) -> Callable[[], None]:
 
 
 def score(job: Job) -> Callable[[], None]:
-    """The raw headline of histograms; a centre is one subtraction more."""
+    """The headline of histograms, the response to silence included."""
     return _scored(histograms(job))
+
+
+def half(job: Job) -> Callable[[], None]:
+    """The same with a network that computes in bfloat16."""
+    return _scored(histograms(job), wrapped=HalfPrecision)
 
 
 def events(job: Job) -> Callable[[], None]:
@@ -105,8 +112,36 @@ def events(job: Job) -> Callable[[], None]:
     return _scored(pair(job), stop_us=job.windows * 50_000)
 
 
-def _scored(streams: list[Events] | list[Tensor], stop_us: int | None = None) -> Callable[[], None]:
-    backbone = Judge.random().backbone
+class HalfPrecision:
+    """A judge's network whose products are computed in bfloat16."""
+
+    def __init__(self, backbone: TappedBackbone) -> None:
+        """Wrap the network."""
+        self.backbone = backbone
+
+    def taps(self, x: Tensor, states: Any, **asked: Any) -> Any:  # noqa: ANN401
+        """The network's maps, in the type they came out in."""
+        with torch.autocast(x.device.type, dtype=torch.bfloat16):
+            return self.backbone.taps(x, states, **asked)
+
+
+def rounding(job: Job) -> float:
+    """How far bfloat16 moves the score of a pair."""
+    streams, reading = histograms(job), Reading(definition=Definition(stages=STAGES))
+    backbone = Judge.load(JUDGE).backbone
+    scores = []
+    for network in (backbone, HalfPrecision(backbone)):
+        (found,) = score_streams(network, streams[1], [streams[0]], [reading])
+        scores.append(found[reading.name].score)
+    return abs(scores[0] - scores[1])
+
+
+def _scored(
+    streams: list[Events] | list[Tensor],
+    stop_us: int | None = None,
+    wrapped: Callable[[TappedBackbone], TappedBackbone] = lambda backbone: backbone,
+) -> Callable[[], None]:
+    backbone = wrapped(Judge.load(JUDGE).backbone)
     reading = Reading(definition=Definition(stages=STAGES))
     start_us = None if stop_us is None else 0
 
@@ -117,7 +152,7 @@ def _scored(streams: list[Events] | list[Tensor], stop_us: int | None = None) ->
     return run
 
 
-SET_UP: Final = {"passes": passes, "score": score, "events": events}
+SET_UP: Final = {"passes": passes, "score": score, "half": half, "events": events}
 
 
 def print_table(windows: int, width: int, height: int) -> None:
@@ -133,4 +168,7 @@ def print_table(windows: int, width: int, height: int) -> None:
         base = base or each
         numbers = (cost.seconds, 1e3 * each, cost.peak_mib, each / base)
         table.add_row(shown, str(count), *(f"{value:.2f}" for value in numbers))
-    Console(width=max(Console().width, 110)).print(table)
+    console = Console(width=max(Console().width, 110))
+    console.print(table)
+    moved = rounding(Job("half", (height, width), min(windows, MOST_IN_MEMORY)))
+    console.print(f"bfloat16 moves the score of this pair by {moved:.1e}")
