@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from eqs.events import Events
-from eqs.metrics.baselines.rates import counts_per_pixel
+from eqs.metrics.baselines.rates import counts_per_pixel, rate_map_correlation
 from eqs.metrics.baselines.timing import pixel_intervals
+from eqs.pair import sentences
 
 BEATS_HZ: Final = (8.0, 400.0)
 BEAT_BIN_US: Final = 1_000
-CLEAR_BEAT: Final = 12.0  # times the median of the spectrum
-HOT: Final = 20.0  # times the mean rate of all pixels
-QUIET_SHARE: Final = 0.25  # of the pixels of the real stream, those with the fewest events
-ALIKE: Final = 1.25  # ratios up to this are no difference worth a word
+FEWEST_BINS: Final = 64
+AROUND_BINS: Final = 25
+CLEAR_BEAT: Final = 12.0  # times the median of the power around
+HIGH_BEAT: Final = 0.1  # of the mean rate
+HOT: Final = 10.0  # times the second busiest of the eight pixels around
+HOT_HZ: Final = 10.0
+QUIET_SHARE: Final = 0.25
+NEIGHBOURS: Final = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.bool_)
 
 
 class Finding(NamedTuple):
@@ -26,7 +31,7 @@ class Finding(NamedTuple):
 
     Args:
         name: what is compared.
-        simulated: its value in the simulated stream.
+        simulated: its value in the simulated stream; NaN where there is none.
         real: in the real one.
         unit: of both.
         sentence: what it means.
@@ -61,138 +66,88 @@ def diagnose(simulated: Events, real: Events, *, start_us: int, stop_us: int) ->
         start_us: its start.
         stop_us: its end.
     """
-    seconds, pixels = 1e-6 * (stop_us - start_us), real.height * real.width
-    maps = counts_per_pixel(simulated), counts_per_pixel(real)
-    quiet = quiet_pixels(maps[1])
-
-    def line(
-        name: str, unit: str, values: tuple[float, float], say: Callable[[float, float], str]
-    ) -> Finding:
-        return Finding(name, *values, unit, say(*values))
-
-    rates = tuple(float(each.sum()) / seconds / pixels for each in maps)
-    shares = tuple(float(each.p.mean()) if len(each) else np.nan for each in (simulated, real))
-    waits = tuple(_median(pixel_intervals(each)) / 1e3 for each in (simulated, real))
-    beats = tuple(frame_beat(each, start_us, stop_us) for each in (simulated, real))
-    floors = tuple(float(each[quiet].sum()) / seconds / max(quiet.sum(), 1) for each in maps)
-    hot = tuple(float(np.mean(each > HOT * max(each.mean(), 1.0))) for each in maps)
-    silent = maps[1] == 0
-    stray = tuple(float(each[silent].sum() / max(each.sum(), 1)) for each in maps)
-    filled = tuple(float(np.mean(each > 0)) for each in maps)
-    return Diagnosis(
-        findings=(
-            line("event rate", "events per pixel and second", _two(rates), _rate_sentence),
-            line("share of ON events", "", _two(shares), _share_sentence),
-            line("median time between events of a pixel", "ms", _two(waits), _wait_sentence),
-            line("strongest beat", "Hz", _two(beats), _beat_sentence),
-            line("rate of the quietest quarter of the real pixels", "events per pixel and second",
-                 _two(floors), _floor_sentence),
-            line("share of hot pixels", "", _two(hot), _hot_sentence),
-            line("share of pixels with any event", "", _two(filled), _filled_sentence),
-            line("share of events on pixels silent in the real stream", "", _two(stray),
-                 _stray_sentence),
-        ),
-        seconds=seconds,
+    seconds, streams = 1e-6 * (stop_us - start_us), (simulated, real)
+    maps = [counts_per_pixel(each) for each in streams]
+    quiet, silent = quiet_pixels(maps[1]), maps[1] == 0
+    rate = "events per pixel and second"
+    rates = [float(each.mean()) / seconds for each in maps]
+    shares = [float(each.p.mean()) if len(each) else np.nan for each in streams]
+    waits = [_median(pixel_intervals(each)) / 1e3 for each in streams]
+    beats = [frame_beat(each, start_us, stop_us) for each in streams]
+    floors = [float(each[quiet].mean()) / seconds for each in maps]
+    hot = [float(hot_pixels(each, real.height, seconds).mean()) for each in maps]
+    filled = [float(np.mean(each > 0)) for each in maps]
+    stray = [float(each[silent].sum() / max(each.sum(), 1)) for each in maps]
+    alike = [rate_map_correlation(simulated, real), 1.0]
+    rows = (
+        ("event rate", rates, rate, sentences.of_rates),
+        ("share of ON events", shares, "", sentences.of_shares),
+        ("median time between events of a pixel", waits, "ms", sentences.of_waits),
+        ("beat, as of frames or lamps", beats, "Hz", sentences.of_beats),
+        ("rate of the quietest real pixels, a quarter or more", floors, rate, sentences.of_floors),
+        ("share of hot pixels", hot, "", sentences.of_hot),
+        ("share of pixels with any event", filled, "", sentences.of_filled),
+        ("share of events where the real stream is silent", stray, "", sentences.of_stray),
+        ("rank correlation of the pixels' rates with the real ones", alike, "",
+         sentences.of_places),
     )  # fmt: skip
+    findings = (
+        Finding(name, values[0], values[1], unit, said(values[0], values[1]))
+        for name, values, unit, said in rows
+    )
+    return Diagnosis(findings=tuple(findings), seconds=seconds)
 
 
 def quiet_pixels(counts: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """The pixels with the fewest events, at least a quarter of them."""
+    """The pixels with the fewest events, at least a quarter of them; all silent ones are in."""
     chosen: NDArray[np.bool_] = counts <= np.quantile(counts, QUIET_SHARE)
     return chosen
+
+
+def hot_pixels(counts: NDArray[np.int64], height: int, seconds: float) -> NDArray[np.bool_]:
+    """Pixels that fire by themselves: far more often than those around them.
+
+    Convention: more than ten times the second busiest of the eight around, which counts as one
+    event at least, and no less than ten times a second. What moves across a pixel also moves
+    across two of its neighbours, and two hot pixels may touch.
+
+    Args:
+        counts: events by pixel, row by row.
+        height: rows of the sensor.
+        seconds: length of the stretch.
+    """
+    image = counts.reshape(height, -1)
+    around = ndimage.rank_filter(image, -2, footprint=NEIGHBOURS, mode="nearest")
+    hot = (image > HOT * np.maximum(around, 1)) & (image >= HOT_HZ * seconds)
+    found: NDArray[np.bool_] = hot.ravel()
+    return found
 
 
 def frame_beat(events: Events, start_us: int, stop_us: int) -> float:
     """Frequency in Hz at which the number of events beats most clearly; 0 where none stands out.
 
-    Convention: counts in bins of 1 ms, their spectrum from 8 to 400 Hz; a line stands out where it
-    is twelve times the median. Of a line and its harmonics the slowest that stands out counts.
+    Convention: counts in bins of 1 ms, their spectrum from 8 to 400 Hz. A line stands out where its
+    power is twelve times the median of those around, so that slow motion is no beat, and its wave
+    is a tenth of the mean rate. Of a line and its harmonics the slowest counts that is half as high
+    as the highest.
     """
     bins = (stop_us - start_us) // BEAT_BIN_US
-    if bins < 64 or not len(events):
+    if bins < FEWEST_BINS or not len(events):
         return 0.0
-    edges = start_us + BEAT_BIN_US * np.arange(bins + 1)
-    counts = np.histogram(events.t, edges)[0].astype(np.float64)
-    power = np.abs(np.fft.rfft((counts - counts.mean()) * np.hanning(bins))) ** 2
+    bin_of = (events.window(start_us, start_us + bins * BEAT_BIN_US).t - start_us) // BEAT_BIN_US
+    counts, taper = np.bincount(bin_of, minlength=bins).astype(np.float64), np.hanning(bins)
+    spectrum = np.abs(np.fft.rfft((counts - counts.mean()) * taper))
     at_hz = np.fft.rfftfreq(bins, 1e-6 * BEAT_BIN_US)
     inside = (at_hz >= BEATS_HZ[0]) & (at_hz <= BEATS_HZ[1])
-    power, at_hz = power[inside], at_hz[inside]
-    strongest = power.max()
-    if strongest <= CLEAR_BEAT * max(float(np.median(power)), 1e-9):
+    power, at_hz = spectrum[inside] ** 2, at_hz[inside]
+    height = 2 * spectrum[inside] / max(counts.mean() * taper.sum(), 1e-9)
+    around = ndimage.median_filter(power, size=AROUND_BINS, mode="nearest")
+    clear = (power > CLEAR_BEAT * around) & (height >= HIGH_BEAT)
+    if not clear.any():
         return 0.0
-    return float(at_hz[np.argmax(power >= 0.5 * strongest)])
+    first = int(np.argmax(clear & (height >= 0.5 * height[clear].max())))
+    return float(at_hz[first + int(np.argmax(power[first : first + 3]))])
 
 
 def _median(values: NDArray[np.int64]) -> float:
     return float(np.median(values)) if len(values) else float("nan")
-
-
-def _two(values: tuple[float, ...]) -> tuple[float, float]:
-    return values[0], values[1]
-
-
-def _times(simulated: float, real: float) -> str:
-    """How many times as much, in words."""
-    if not real:
-        return "the same: none" if not simulated else "some, the real stream has none"
-    ratio = simulated / real
-    if not ratio:
-        return "nothing"
-    if 1 / ALIKE <= ratio <= ALIKE:
-        return "about as much"
-    return f"{ratio:.1f} times as much" if ratio > 1 else f"{1 / ratio:.1f} times less"
-
-
-def _rate_sentence(simulated: float, real: float) -> str:
-    return f"The simulated stream fires {_times(simulated, real)} as the real sensor.".replace(
-        "less as", "less than"
-    ).replace("nothing as", "nothing beside")
-
-
-def _share_sentence(simulated: float, real: float) -> str:
-    if not abs(simulated - real) > 0.05:
-        return "Brighter and darker events are balanced alike."
-    more, fewer = ("brighter", "darker") if simulated > real else ("darker", "brighter")
-    return f"It has more {more} and fewer {fewer} events than the real sensor."
-
-
-def _wait_sentence(simulated: float, real: float) -> str:
-    if not simulated or not real or np.isnan(simulated) or np.isnan(real):
-        return "One of them hardly has two events at a pixel."
-    if 1 / ALIKE <= simulated / real <= ALIKE:
-        return "Events of a pixel follow each other at the same pace."
-    return (
-        "Events of a pixel follow each other faster: bursts, or noise."
-        if simulated < real
-        else "Events of a pixel follow each other more slowly."
-    )
-
-
-def _beat_sentence(simulated: float, real: float) -> str:
-    if simulated and not real:
-        return f"Events come in time with something at {simulated:.0f} Hz, most likely the frames."
-    if real and not simulated:
-        return f"The real scene beats at {real:.0f} Hz, as lamps do; the simulated one does not."
-    return "Both beat." if simulated else "Neither keeps a beat."
-
-
-def _floor_sentence(simulated: float, real: float) -> str:
-    return f"Where the real sensor is quietest there is {_times(simulated, real)}."
-
-
-def _hot_sentence(simulated: float, real: float) -> str:
-    if simulated > 2 * real + 1e-4:
-        return "It has more pixels that fire without a reason."
-    if real > 2 * simulated + 1e-4:
-        return "It lacks the hot pixels of the real sensor."
-    return "Hot pixels are as frequent."
-
-
-def _filled_sentence(simulated: float, real: float) -> str:
-    return f"Pixels with any event: {_times(simulated, real)}."
-
-
-def _stray_sentence(simulated: float, _: float) -> str:
-    if simulated < 0.02:
-        return "Hardly any event falls where the real stream is silent."
-    return f"{100 * simulated:.0f} % of its events fall where the real stream has none at all."

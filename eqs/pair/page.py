@@ -2,146 +2,139 @@
 
 from __future__ import annotations
 
-import base64
 import html
-import io
 import json
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
-from eqs.events import Events
 from eqs.files import write_text
-from eqs.pair.diagnosis import Diagnosis
+from eqs.pair.diagnosis import Diagnosis, Finding
+from eqs.pair.nearest import Nearest
+from eqs.pair.pictures import AGREE, DIFFER, PageWindows
 
-MOST_WINDOWS: Final = 200
-MOST_PIXELS: Final = 20_000_000  # of all pictures of a stream together
-PALETTE: Final = (255, 255, 255, 215, 48, 31, 44, 95, 209)  # nothing, darker, brighter
-MARK: Final = "/*DATA*/"
-
-
-@dataclass(frozen=True, kw_only=True)
-class PageWindows:
-    """The windows that a page shows.
-
-    Args:
-        numbers: which windows of the score.
-        simulated: pictures of the simulated stream, as data URIs.
-        real: of the real stream.
-        maps: similarity by patch, shape (rows, columns) each; NaN where nothing happens.
-    """
-
-    numbers: Sequence[int]
-    simulated: Sequence[str]
-    real: Sequence[str]
-    maps: Sequence[NDArray[np.float64]]
+MARK: Final = re.compile(r"<!--([A-Z]+)-->|/\*(DATA)\*/")
+LONGEST_CURVE: Final = 20_000
 
 
-def shown_windows(count: int, height: int, width: int) -> list[int]:
-    """Numbers of the windows that a page of bounded size shows, evenly chosen.
-
-    Example:
-        >>> shown_windows(5, 480, 640), len(shown_windows(5000, 480, 640))
-        ([0, 1, 2, 3, 4], 65)
-    """
-    most = max(1, min(count, MOST_WINDOWS, MOST_PIXELS // (height * width)))
-    chosen: list[int] = np.unique(np.linspace(0, count - 1, most).round().astype(int)).tolist()
-    return chosen
-
-
-def event_uri(events: Events) -> str:
-    """The last event of every pixel as a PNG in three colours, as a data URI."""
-    image = np.zeros((events.height, events.width), np.uint8)
-    image[events.y, events.x] = 1 + events.p
-    picture = Image.fromarray(image, "P")
-    picture.putpalette(PALETTE)
-    return _uri(picture, optimize=True)
-
-
-def map_uri(similarity: NDArray[np.float64]) -> str:
-    """A map as a PNG: white where the streams agree, dark where not, grey where nothing happens."""
-    level = np.clip(np.nan_to_num(similarity, nan=1.0), 0.0, 1.0)[..., None]
-    near, far = np.array([255.0, 250.0, 240.0]), np.array([103.0, 0.0, 60.0])
-    colours = far + (near - far) * level
-    colours[np.isnan(similarity)] = 190.0
-    return _uri(Image.fromarray(colours.round().astype(np.uint8), "RGB"))
-
-
-def _uri(picture: Image.Image, **options: Any) -> str:  # noqa: ANN401
-    buffer = io.BytesIO()
-    picture.save(buffer, "PNG", **options)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
-
-
-def write_page(
-    path: Path,
-    *,
-    title: str,
-    lines: Sequence[str],
-    curve: NDArray[np.float64],
-    warmup: int,
-    window_us: int,
-    levels: Mapping[str, float],
-    windows: PageWindows,
-    diagnosis: Diagnosis,
-    nearest: Sequence[tuple[str, float]],
-    size: tuple[int, int],
-) -> None:
-    """Write a page that needs no network, no other file and no server.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PageContent:
+    """What a page says and shows.
 
     Args:
-        path: the file.
         title: what was compared.
         lines: what the console says, in sentences.
-        curve: score of every window.
+        reading: name of the score that the curve and the maps show.
+        curve: score of every window; NaN where no patch counts.
         warmup: windows at the start that do not count.
+        start_us: start of the first window.
         window_us: length of a window.
         levels: by name what the curve is compared with, as chance and ceiling.
         windows: what the slider shows.
         diagnosis: what else differs.
-        nearest: damages of the real stream with their scores.
+        nearest: damages of the real stream with their scores; none where they were not asked for.
         size: rows and columns of the sensor.
     """
+
+    title: str
+    lines: Sequence[str]
+    reading: str
+    curve: NDArray[np.float64]
+    warmup: int
+    start_us: int
+    window_us: int
+    levels: Mapping[str, float]
+    windows: PageWindows
+    diagnosis: Diagnosis
+    nearest: Sequence[Nearest]
+    size: tuple[int, int]
+
+
+def write_page(path: Path, content: PageContent) -> Path:
+    """Write a page that needs no network, no other file and no server."""
+    return write_text(render_page(content), path)
+
+
+def render_page(content: PageContent) -> str:
+    """The page as text; every text in it is escaped."""
     template = (files("eqs.pair") / "page.html").read_text(encoding="utf-8")
-    data = {
-        "curve": [None if np.isnan(value) else round(float(value), 4) for value in curve],
-        "warmup": warmup,
-        "seconds": 1e-6 * window_us,
-        "levels": {name: value for name, value in levels.items() if np.isfinite(value)},
-        "numbers": list(windows.numbers),
-        "simulated": list(windows.simulated),
-        "real": list(windows.real),
-        "maps": [map_uri(each) for each in windows.maps],
-        "size": list(size),
-    }
-    rows = [
-        f"<tr><th scope=row>{html.escape(f.name)}</th><td>{_shown(f.simulated)}</td>"
-        f"<td>{_shown(f.real)}</td><td>{html.escape(f.unit)}</td>"
-        f"<td>{html.escape(f.sentence)}</td></tr>"
-        for f in diagnosis.findings
-    ]
-    damages = [
-        f"<tr><th scope=row>{html.escape(words)}</th><td>{value:.3f}</td></tr>"
-        for words, value in nearest
-    ]
+    scale = ", ".join(f"rgb{colour}" for colour in (DIFFER, AGREE))
     parts = {
-        "<!--TITLE-->": html.escape(title),
-        "<!--LINES-->": "\n".join(f"<p>{html.escape(line)}</p>" for line in lines),
-        "<!--DIAGNOSIS-->": "\n".join(rows),
-        "<!--NEAREST-->": "\n".join(damages),
+        "TITLE": html.escape(content.title),
+        "READING": html.escape(content.reading),
+        "LINES": "\n".join(f"<p>{html.escape(line)}</p>" for line in content.lines),
+        "DIAGNOSIS": "\n".join(map(_finding_row, content.diagnosis.findings)),
+        "SECONDS": f"{content.diagnosis.seconds:.3g}",
+        "NEAREST": "\n".join(map(_damage_row, content.nearest)) or _no_damage(),
+        "SCALE": scale,
         # What closes a script in a text would end it here as well.
-        MARK: json.dumps(data).replace("</", "<\\/"),
+        "DATA": json.dumps(_data(content), allow_nan=False).replace("</", "<\\/"),
     }
-    for mark, text in parts.items():
-        template = template.replace(mark, text)
-    write_text(template, path)
+    # In one pass, so that a mark within a text stays a text.
+    return MARK.sub(lambda found: parts[found[1] or found[2]], template)
 
 
-def _shown(value: float) -> str:
-    return "none" if np.isnan(value) else f"{value:.3g}"
+def _data(content: PageContent) -> dict[str, object]:
+    """What the page's script reads."""
+    shown = content.windows.within()
+    step = -(-len(content.curve) // LONGEST_CURVE)
+    curve = [None if math.isnan(value) else round(value, 4) for value in content.curve.tolist()]
+    return {
+        "reading": content.reading,
+        "curve": curve[::step],
+        "step": step,
+        "values": [curve[number] for number in shown.numbers],
+        "warmup": content.warmup,
+        "windowSeconds": 1e-6 * content.window_us,
+        "startSeconds": 1e-6 * content.start_us,
+        "levels": {
+            name: round(value, 4) for name, value in content.levels.items() if math.isfinite(value)
+        },
+        "numbers": list(shown.numbers),
+        "simulated": list(shown.simulated),
+        "real": list(shown.real),
+        "maps": list(shown.maps),
+        "size": list(content.size),
+    }
+
+
+def _finding_row(found: Finding) -> str:
+    name, unit, said = (html.escape(text) for text in (found.name, found.unit, found.sentence))
+    unit = f" <small>{unit}</small>" if unit else ""
+    return (
+        f'<tr><th scope="row">{name}{unit}</th>'
+        f'<td data-label="simulated">{shown(found.simulated)}</td>'
+        f'<td data-label="real">{shown(found.real)}</td>'
+        f'<td data-label="which means">{said}</td></tr>'
+    )
+
+
+def _damage_row(found: Nearest) -> str:
+    return (
+        f'<tr><th scope="row">{html.escape(found.words)}</th>'
+        f'<td data-label="scores">{found.score:.3f}</td>'
+        f'<td data-label="unlike by">{found.apart:.3f}</td></tr>'
+    )
+
+
+def _no_damage() -> str:
+    return (
+        '<tr><td colspan="3">Not tried: nearest was false, or the real stream is silent.</td></tr>'
+    )
+
+
+def shown(value: float) -> str:
+    """A figure for a person.
+
+    Example:
+        >>> shown(0.123456), shown(12.0), shown(float("nan"))
+        ('0.123', '12', 'none')
+    """
+    return "none" if math.isnan(value) else f"{value:.3g}"

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.progress import track
 
 from eqs.data import EventSource, Recording
 from eqs.events import EventReader, Events
@@ -21,6 +20,7 @@ from eqs.metrics.definition import choices
 from eqs.metrics.grid import Grid
 from eqs.metrics.windows import common_grid
 from eqs.names import BASELINE
+from eqs.pipelines.following import Following, all_of
 from eqs.pipelines.scoring import Scoring
 
 # Anchors and baselines hold events in memory: a long recording lends its first quarter minute.
@@ -59,10 +59,11 @@ def score_recordings(
         systems: where each system's events lie, by its name in the tables.
         rows: rows from the top that are looked at; all of them if None.
     """
-    scores = Scores()
-    for index, recording in enumerate(track(recordings, description="scoring")):
+    scores, follow = Scores(), Following(len(recordings))
+    for index, recording in enumerate(recordings):
         other = partner(recording, [*recordings[index + 1 :], *recordings[:index]], rows)
-        with ExitStack() as stack:
+        follow.recording(recording.name)
+        with follow, ExitStack() as stack:
 
             def opened(recording: Recording, path: Path) -> EventReader:
                 size = recording.height, recording.width
@@ -78,7 +79,7 @@ def score_recordings(
                     grid=recording_grid(recording, real, window_us),
                     frame_times_us=recording.frame_times_us,
                 )
-                score_scene(scoring, scene, real, streams, unrelated, scores)
+                score_scene(scoring, scene, real, streams, unrelated, scores, follow)
             except ValueError as error:
                 raise ValueError(f"{recording.name}: {error}") from error
     return scores
@@ -123,16 +124,28 @@ def score_scene(
     streams: Mapping[str, EventReader | LoadedEvents],
     other: EventReader | LoadedEvents | None,
     scores: Scores,
+    follow: Following | None = None,
 ) -> None:
     """Add the scores of one recording; `other`, of the same size, lends the chance level."""
+    follow = follow or Following()
     start, stop = scene.grid.start_us, scene.grid.stop_us
     candidates = list(streams.values())
     frechet = FeatureFrechet(scoring.headline.definition.maps)
-    found = scoring.score(real, candidates, start_us=start, stop_us=stop, watch=frechet)
-    untrained = untrained_scores(scoring, real, candidates, start, stop)
+    watch = follow.a_pass("scoring", scoring.headline.definition, start, stop)
+    found = scoring.score(
+        real, candidates, start_us=start, stop_us=stop, watch=all_of(frechet, watch)
+    )
+    untrained = untrained_scores(scoring, real, candidates, start, stop, follow)
     frames = scene.frame_times_us
     known = score_anchors(
-        scoring, real, start, stop, other=other, frame_times_us=frames, key=scene.name
+        scoring,
+        real,
+        start,
+        stop,
+        other=other,
+        frame_times_us=frames,
+        key=scene.name,
+        follow=follow,
     )
     shared = shared_columns(scoring, scene, real, known)
     for (name, stream), by_reading, without, distance in zip(
@@ -211,6 +224,7 @@ def untrained_scores(
     candidates: Sequence[EventReader | LoadedEvents],
     start_us: int,
     stop_us: int,
+    follow: Following,
 ) -> list[float]:
     """The headline with an untrained network; a centre that it needs is this recording's own."""
     headline = scoring.headline.definition
@@ -219,7 +233,8 @@ def untrained_scores(
     if headline.needs_centre:
         control = control.centred_on([real], [headline.tap], **chosen)
     metric = EventQualityScore(control, chunk_windows=scoring.metric.chunk_windows, **chosen)
-    found = metric.score(real, candidates, start_us=start_us, stop_us=stop_us)
+    watch = follow.a_pass("untrained network", headline, start_us, stop_us)
+    found = metric.score(real, candidates, start_us=start_us, stop_us=stop_us, watch=watch)
     return [by_reading[metric.reading.name].score for by_reading in found]
 
 
@@ -258,6 +273,7 @@ def score_anchors(
     other: EventReader | LoadedEvents | None = None,
     frame_times_us: NDArray[np.int64] | None = None,
     key: str = "",
+    follow: Following | None = None,
 ) -> dict[str, dict[str, float]]:
     """Scores by anchor and reading; those that need `other` or frames are left out without them."""
     stop_us = min(stop_us, start_us + ANCHOR_US)
@@ -271,7 +287,11 @@ def score_anchors(
         stop_us=stop_us,
         key=key,
     )
-    found = scoring.score(events, list(streams.values()), start_us=start_us, stop_us=stop_us)
+    headline = scoring.headline.definition
+    watch = (follow or Following()).a_pass("anchors", headline, start_us, stop_us)
+    found = scoring.score(
+        events, list(streams.values()), start_us=start_us, stop_us=stop_us, watch=watch
+    )
     return {
         name: {reading: score.score for reading, score in by_reading.items()}
         for name, by_reading in zip(streams, found, strict=True)

@@ -11,17 +11,16 @@ from typing import Any
 
 from omegaconf import DictConfig
 from rich.console import Console
-from rich.table import Table
 
 from eqs.events.bag import is_bag_folder
 from eqs.extras import DISTRIBUTION
 from eqs.files import complete_file, read_json, write_json
 from eqs.metrics import StreamScore
-from eqs.metrics.grid import Grid, fewest_windows
-from eqs.pair import write_page
-from eqs.pair.nearest import sentence
+from eqs.metrics.grid import fewest_windows
+from eqs.pair import PageContent, write_page
 from eqs.pipelines.command import explained
 from eqs.pipelines.pair import Pair, compare
+from eqs.pipelines.pair_lines import LEVELS, lines, rates, show
 from eqs.pipelines.score_folders import score_folders
 from eqs.pipelines.scoring import Scoring, find_scoring
 
@@ -90,18 +89,23 @@ def record(pair: Pair, scoring: Scoring) -> dict[str, Any]:
         "readings": {name: score.score for name, score in pair.scores.items()},
         "by_stage": list(result.by_stage),
         "anchors": pair.anchors,
-        "chance": pair.anchors["chance"][scoring.headline.name],
+        "reading": scoring.headline.name,
+        **{name: pair.anchors[name][scoring.headline.name] for name in LEVELS},
         "chance_is": pair.chance,
-        "ceiling": pair.anchors["ceiling"][scoring.headline.name],
-        "blank": pair.anchors["blank"][scoring.headline.name],
         "nearest": [each._asdict() for each in pair.nearest],
-        "diagnosis": [each._asdict() for each in pair.diagnosis.findings],
+        "nearest_us": pair.nearest_us,
+        "nearest_eqs": pair.nearest_score if pair.nearest else None,
+        "diagnosis": [
+            {name: None if value != value else value for name, value in each._asdict().items()}
+            for each in pair.diagnosis.findings
+        ],
         "span_us": [pair.grid.start_us, pair.grid.stop_us],
         "windows": result.n_windows,
         "share": pair.grid.share,
         "simulated_span_us": None if pair.watched_us is None else list(pair.watched_us),
         "sensor": list(pair.size),
         "events": pair.events,
+        "rates": rates(pair),
         "definition": scoring.headline.definition.hash,
         "weights_sha256": scoring.judge.weights_sha256,
     }
@@ -130,78 +134,26 @@ def draw(
     save_figure(curve, out, "curve")
 
 
-def extent_line(grid: Grid, score: StreamScore) -> str:
-    """What was scored, in a line: the span, its windows, its share of the real file."""
-    share = "an unknown share" if grid.share is None else f"{100 * grid.share:.1f} %"
-    return (
-        f"scored from {grid.start_us} us to {grid.stop_us} us, {share} of the real file: "
-        f"{grid.count} windows, of which {score.n_windows} count after the warm-up"
-    )
-
-
-def show(pair: Pair, scoring: Scoring, console: Console) -> None:
-    """Print every reading beside its anchors, the headline first, and what it means."""
-    table = Table(title="EQS (higher is better)")
-    chosen = ("ceiling", "thinned_50", "poisson", "chance", "blank")
-    table.add_column("reading")
-    for name in ("simulated", *chosen):
-        table.add_column(name.replace("_", " "), justify="right")
-    for reading, score in pair.scores.items():
-        values = [score.score, *(pair.anchors[name][reading] for name in chosen)]
-        table.add_row(reading, *(f"{value:.3f}" for value in values))
-    console.print(table)
-    for line in lines(pair, scoring):
-        console.print(line, markup=False, highlight=False)
-
-
-def lines(pair: Pair, scoring: Scoring) -> list[str]:
-    """What a person wants to know, a sentence each."""
-    headline = scoring.headline
-    result = pair.scores[headline.name]
-    anchors = {name: values[headline.name] for name, values in pair.anchors.items()}
-    said = [
-        f"{headline.name}: {result.score:.3f}, between chance {anchors['chance']:.3f} and ceiling "
-        f"{anchors['ceiling']:.3f}; no events at all {anchors['blank']:.3f}",
-        f"chance is {pair.chance}; ceiling is the real one without a tenth of its events",
-        extent_line(pair.grid, result),
-        rate_line(pair),
-        f"judge: {scoring.judge.description} ({scoring.judge.weights_sha256[:12]})",
-    ]
-    if pair.nearest:
-        said.insert(1, sentence(pair.nearest, pair.nearest_score))
-    return said
-
-
-def rate_line(pair: Pair) -> str:
-    """Numbers of events, and their rates per pixel and second."""
-    seconds = 1e-6 * (pair.grid.stop_us - pair.grid.start_us)
-    pixels = pair.size[0] * pair.size[1]
-    simulated, real = (pair.events[name] for name in ("simulated", "real"))
-    ratio = f"{simulated / real:.2f} simulated events per real one" if real else "no real events"
-    return (
-        f"{simulated} simulated and {real} real events, {simulated / seconds / pixels:.2f} and "
-        f"{real / seconds / pixels:.2f} per pixel and second: {ratio}"
-    )
-
-
 def write_pair_page(path: Path, files: Mapping[str, str], pair: Pair, scoring: Scoring) -> None:
     """Write the page with both streams side by side."""
     headline = scoring.headline.name
     result = pair.scores[headline]
     names = [Path(files[each]).name for each in ("simulated", "real")]
-    write_page(
-        path,
+    content = PageContent(
         title=f"{names[0]} beside {names[1]}: {result.score:.3f}",
         lines=lines(pair, scoring),
+        reading=headline,
         curve=result.curve,
         warmup=result.warmup,
+        start_us=pair.grid.start_us,
         window_us=pair.grid.window_us,
-        levels={name: pair.anchors[name][headline] for name in ("chance", "ceiling", "blank")},
+        levels={name: pair.anchors[name][headline] for name in LEVELS},
         windows=pair.windows,
         diagnosis=pair.diagnosis,
-        nearest=[(each.words, each.score) for each in pair.nearest],
+        nearest=pair.nearest,
         size=pair.size,
     )
+    write_page(path, content)
 
 
 def refuse_others(out: Path) -> None:

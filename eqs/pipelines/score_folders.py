@@ -11,7 +11,6 @@ from typing import Any
 
 from omegaconf import DictConfig
 from rich.console import Console
-from rich.progress import track
 
 from eqs.content import content_hashes
 from eqs.data.places import EVENT_SUFFIXES, EVENTS
@@ -23,6 +22,7 @@ from eqs.files import read_json, short_hash, write_json
 from eqs.frames import by_name
 from eqs.metrics.grid import fewest_windows
 from eqs.metrics.windows import common_grid
+from eqs.pipelines.following import Following
 from eqs.pipelines.score import Scene, Scores, score_scene
 from eqs.pipelines.scoring import Scoring
 
@@ -143,17 +143,24 @@ def score_folders(cfg: DictConfig, scoring: Scoring) -> None:
     """
     out, pairs = Path(cfg.out), find_pairs(Path(cfg.simulated), Path(cfg.real))
     names = pairs.recordings
-    scores = Scores()
-    for index, name in enumerate(track(names, description="scoring")):
+    scores, follow = Scores(), Following(len(names))
+    for index, name in enumerate(names):
         other = names[(index + 1) % len(names)] if len(names) > 1 else None
-        rows, anchored = _kept_or_scored(cfg, scoring, pairs, name, other)
+        follow.recording(name)
+        with follow:
+            rows, anchored = _kept_or_scored(cfg, scoring, pairs, name, other, follow)
         scores.rows += rows
         scores.anchors += anchored
     publish(out, scores, scoring, {"simulated": str(cfg.simulated), "real": str(cfg.real)})
 
 
 def _kept_or_scored(
-    cfg: DictConfig, scoring: Scoring, pairs: Pairs, name: str, other: str | None
+    cfg: DictConfig,
+    scoring: Scoring,
+    pairs: Pairs,
+    name: str,
+    other: str | None,
+    follow: Following,
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     files = [pairs.real[name], *pairs.streams(name).values()]
     lender = [] if other is None else [pairs.real[other]]
@@ -169,14 +176,21 @@ def _kept_or_scored(
     if record.is_file() and (kept := read_json(record)).get("key") == key:
         return kept["rows"], kept["anchors"]
     try:
-        scores = scored(cfg, scoring, pairs, name, other)
+        scores = scored(cfg, scoring, pairs, name, other, follow)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
     write_json(record, {"key": key, "rows": scores.rows, "anchors": scores.anchors})
     return scores.rows, scores.anchors
 
 
-def scored(cfg: DictConfig, scoring: Scoring, pairs: Pairs, name: str, other: str | None) -> Scores:
+def scored(
+    cfg: DictConfig,
+    scoring: Scoring,
+    pairs: Pairs,
+    name: str,
+    other: str | None,
+    follow: Following,
+) -> Scores:
     """The scores of one recording; another one of its sensor lends the chance level."""
     size, scores = (cfg.height, cfg.width, cfg.rows), Scores()
     window_us = scoring.headline.definition.window_us
@@ -193,7 +207,8 @@ def scored(cfg: DictConfig, scoring: Scoring, pairs: Pairs, name: str, other: st
         if lender is not None and (lender.height, lender.width) != (real.height, real.width):
             lender = None
         grid = common_grid([real, *streams.values()], window_us, cfg.start_us, cfg.stop_us)
-        score_scene(scoring, Scene(name=name, grid=grid), real, streams, lender, scores)
+        scene = Scene(name=name, grid=grid)
+        score_scene(scoring, scene, real, streams, lender, scores, follow)
     return scores
 
 

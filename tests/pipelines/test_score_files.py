@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import runpy
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +31,7 @@ def files(make_events, tmp_path):
 
 def run(simulated, real, out, *overrides):
     given = [f"simulated={simulated}", f"real={real}", f"out={out}", "eqs.judge=random"]
+    given.append("nearest=false")  # as most of these tests do not ask for it
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose("score", [*given, f"paths.runs={out}/runs", *overrides])
     score_files(cfg)
@@ -58,7 +60,7 @@ def test_counts_and_pooling_reach_the_score(files, tmp_path):
 
 def test_files_beside_the_score(files, tmp_path):
     out = tmp_path / "out"
-    run(files[1], files[0], out)
+    run(files[1], files[0], out, "nearest=true")
     found = json.loads((out / "score.json").read_text())
     assert found["eqs"] < found["anchors"]["ceiling"]["hidden_silence"] < 1.0
     with (out / "curve.csv").open() as file:
@@ -69,7 +71,14 @@ def test_files_beside_the_score(files, tmp_path):
     assert {path.name for path in out.glob("*.png")} == {"map.png", "curve.png"}
     assert found["blank"] == pytest.approx(0.0, abs=1e-3)
     assert found["blank"] < found["chance"] < found["ceiling"]
-    assert {"family", "grade", "score", "words"} == found["nearest"][0].keys()
+    assert {"family", "grade", "score", "words", "apart"} == found["nearest"][0].keys()
+    assert (found["reading"], found["nearest_us"]) == ("hidden_silence", 1_950_000)
+    assert found["nearest_eqs"] == pytest.approx(found["eqs"], abs=1e-6)  # all windows were tried
+    seconds, pixels = 1.95, 64 * 96
+    per_pixel = found["events"]["real"] / seconds / pixels
+    assert found["rates"]["real_per_pixel_and_second"] == pytest.approx(per_pixel)
+    ratio = found["events"]["simulated"] / found["events"]["real"]
+    assert found["rates"]["simulated_per_real"] == pytest.approx(ratio)
     rates = {line["name"]: line for line in found["diagnosis"]}["event rate"]
     assert rates["simulated"] == pytest.approx(rates["real"], rel=0.05)
     assert "mine" not in (page := (out / "score.html").read_text())
@@ -92,11 +101,14 @@ def test_a_stream_is_as_far_as_the_damage_that_it_is(files, tmp_path, capsys):
     keep = np.random.default_rng(0).random(len(real)) < 0.5
     fields = {name: getattr(real, name)[keep] for name in "txyp"}
     Events(**fields, height=64, width=96, span_us=real.extent_us).save(tmp_path / "half.h5")
-    found = result(tmp_path / "half.h5", files[0], tmp_path / "out")
-    dropped = next(each for each in found["nearest"] if each["family"] == "dropped")
-    assert dropped["grade"] == pytest.approx(0.5, abs=0.1)
-    assert "as far from real as:" in capsys.readouterr().out
-    assert result(files[1], files[0], tmp_path / "none", "nearest=false")["nearest"] == []
+    found = result(tmp_path / "half.h5", files[0], tmp_path / "out", "nearest=true")
+    assert found["nearest"][0]["family"] == "dropped"
+    assert found["nearest"][0]["grade"] == pytest.approx(0.5, abs=0.1)
+    printed = capsys.readouterr().out
+    assert re.search(r"as far from real as: [45]\d% of the events missing", printed)
+    assert "0.50 simulated events per real one" in printed
+    assert re.search(r"hidden_silence: 0\.\d+, \d+ % of the way from chance to ceiling", printed)
+    assert result(files[1], files[0], tmp_path / "none")["nearest"] == []
 
 
 def test_a_missing_file_ends_in_one_sentence(files, tmp_path, caplog):
@@ -109,6 +121,7 @@ def test_a_missing_file_ends_in_one_sentence(files, tmp_path, caplog):
 def test_two_plain_arguments_are_the_files_even_if_they_are_one(files, tmp_path, monkeypatch):
     paths = [f"paths.{key}={tmp_path / key}" for key in ("runs", "results", "logs")]
     given = [*map(str, (files[0], files[0])), "eqs.judge=random", f"out={tmp_path / 'out'}"]
+    given.append("nearest=false")
     monkeypatch.setattr("sys.argv", ["score.py", *given, *paths])
     runpy.run_path(str(CONFIGS.parents[1] / "scripts" / "score.py"), run_name="__main__")
     assert json.loads((tmp_path / "out" / "score.json").read_text())["eqs"] == pytest.approx(1.0)
@@ -156,7 +169,7 @@ def test_the_output_says_what_was_scored(files, tmp_path, capsys):
     assert found["sensor"] == [64, 96]
     assert (
         f"scored from 500000 us to 1500000 us, {100 * found['share']:.1f} % of the real file: "
-        "20 windows, of which 15 count after the warm-up"
+        "20 windows, of which 15 count after the warm-up, 0.75 s"
     ) in shown(capsys.readouterr().out)
 
 
