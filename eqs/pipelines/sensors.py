@@ -80,6 +80,22 @@ def check_sensor(cfg: DictConfig) -> None:
     )
 
 
+def require_events(data: Dataset, sensor: Sensor) -> None:
+    """See that the events of a chosen camera were made, which a check does not do.
+
+    Raises:
+        ValueError: they were not.
+    """
+    loaded = [data.load(each) for held in data.sequences().values() for each in held]
+    missing = [each.name for each in loaded if not each.events_path.is_file()]
+    if missing:
+        raise ValueError(
+            f"Expected events of {sensor.words} in {len(loaded)} recordings, found none in "
+            f"{len(missing)} ({', '.join(missing[:3])}...), as they are made on first use; type "
+            "python scripts/prepare.py with the same data and sensor first"
+        )
+
+
 def own_events(cfg: DictConfig) -> DictConfig:
     """The same configuration with the data set's own camera; what `sim` names stays as it is.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import pandas as pd
@@ -51,12 +51,24 @@ def print_sensors(table: pd.DataFrame, console: Console) -> None:
             (str(system), *(number(cell, value) for cell in cells))
             for system, cells in zip(wide.index, wide.to_numpy().tolist(), strict=True)
         )
-        print_table(Table(header=("system", *map(str, wide.columns)), rows=rows), title, console)
+        print_table(Table(header=("system", *_short(wide.columns)), rows=rows), title, console)
     if len(table[["definition", "weights_sha256"]].dropna().drop_duplicates()) > 1:
         console.print(
             "[bold]note[/bold]: the sensors were scored by several judges or definitions; compare "
             "within a column, or set eqs.judge to one judge for all"
         )
+
+
+def _short(labels: Iterable[str]) -> list[str]:
+    """Names without their hashes, where they are still apart.
+
+    Example:
+        >>> _short(["gen4-e7a7e3bdc42b", "own-1", "own-2"])
+        ['gen4', 'own-1', 'own-2']
+    """
+    names = {label: label.rpartition("-")[0] for label in labels}
+    held = list(names.values())
+    return [name if held.count(name) == 1 else label for label, name in names.items()]
 
 
 def _scores(folder: Path) -> pd.DataFrame | None:
