@@ -34,9 +34,10 @@ def as_typed(arguments: Sequence[str]) -> list[str]:
 
 
 def with_flags(arguments: Sequence[str]) -> list[str]:
-    """Flags as the keys they stand for, wherever they are typed."""
+    """Flags as the keys they stand for, wherever they are typed; behind Hydra's own, like -m."""
     flags = {"--eqs": "score=true", "--sanity": "sanity=true"}
-    return [flags.get(argument, argument) for argument in arguments]
+    others = [argument for argument in arguments if argument not in flags]
+    return [*others, *(flags[argument] for argument in arguments if argument in flags)]
 
 
 def with_files(arguments: Sequence[str]) -> list[str]:

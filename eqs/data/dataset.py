@@ -59,6 +59,16 @@ class Dataset(ABC):
     def make_frames(self) -> None:  # noqa: B027
         """Make frames in the view of the event camera, where there are only others."""
 
+    def make_events(self, recordings: Sequence[Recording]) -> None:  # noqa: B027
+        """Make the real events of these recordings, where a rendered camera makes them on demand.
+
+        Whoever reads real events asks for them first.
+        """
+
+    def events_said(self) -> str:
+        """How many real events there are, in a sentence; empty where nobody counted them."""
+        return ""
+
     def sequences(self) -> Mapping[str, Sequence[Any]]:
         """What `load` reads of each split, objects with a `name`; there may be none."""
         return {split: self.recordings(split) for split in self.split_names}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Protocol
@@ -23,10 +23,19 @@ class Generator(Protocol):
 
     @property
     def sensor_hash(self) -> str:
-        """What identifies the event camera that the data set is made with."""
+        """What identifies the event camera that is looked at."""
 
     def generate(self, root: Path) -> None:
         """Make what is missing below `root`; nothing where all is there."""
+
+    def events_file(self, root: Path, name: str) -> Path | None:
+        """Where another sensor's events of a recording lie; None where they lie with the frames."""
+
+    def record(self, root: Path, names: Collection[str]) -> None:
+        """Make another sensor's events of these recordings, where they are missing."""
+
+    def events_said(self, root: Path) -> str:
+        """How many events there are, in a sentence."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +126,15 @@ class DSECFolder(Dataset):
             chosen = {each.name: each for split in self._named() for each in self._chosen(split)}
             self.event_view.prepare(list(chosen.values()))
 
+    def make_events(self, recordings: Sequence[Recording]) -> None:
+        """Make another sensor's events of these recordings, where one is chosen and they lack."""
+        if self.generator is not None:
+            self.generator.record(Path(self.root), {each.folder.name for each in recordings})
+
+    def events_said(self) -> str:
+        """How many events the rendered camera sees, in a sentence."""
+        return "" if self.generator is None else self.generator.events_said(Path(self.root))
+
     def sequences(self) -> dict[str, list[Places]]:
         """Where the sequences of each split lie, which may be none."""
         return {split: self._chosen(split) for split in self.splits}
@@ -142,8 +160,12 @@ class DSECFolder(Dataset):
         return [self.load(places) for places in chosen]
 
     def load(self, sequence: Places) -> Recording:
-        """The recording of a sequence, of the sensor's size."""
-        return Recording.at(self._viewed(sequence), *parse_size(self.size))
+        """The recording of a sequence, of the sensor's size, with the chosen sensor's events."""
+        places = self._viewed(sequence)
+        if self.generator is not None:
+            events = self.generator.events_file(Path(self.root), sequence.name)
+            places = places if events is None else replace(places, events=events)
+        return Recording.at(places, *parse_size(self.size))
 
     def scored_recordings(self) -> list[Recording]:
         """The recordings that simulators are scored on."""

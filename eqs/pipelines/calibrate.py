@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from eqs.pipelines.command import explained
 from eqs.pipelines.judge import require_judge
 from eqs.pipelines.score import recording_grid
 from eqs.pipelines.scoring import Scoring, find_scoring
+from eqs.pipelines.sensors import results_folder
 from eqs.simulators import Simulator
 from eqs.study import calibration_table, print_calibration, write_table
 from eqs.study.notes import few_windows
@@ -160,6 +160,7 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
     scoring = find_scoring(cfg, data)
     train, test = (data.recordings(split) for split in ("train", "test"))
     shape = data.crop_rows, scoring.headline.definition.window_us
+    data.make_events([*train[: cfg.tune_on], *test])
     clips = [Clip.of(recording, *shape) for recording in train[: cfg.tune_on]]
     counted = {clip.name: clip.windows(scoring) for clip in clips}
     search = Search(scoring, simulator, ranges, clips)
@@ -170,7 +171,7 @@ def calibrate(cfg: DictConfig) -> dict[str, Any]:
         counted[clip.name] = clip.windows(scoring)
         measured["before"].append(clip.measures(scoring, simulator))
         measured["after"].append(clip.measures(scoring, best))
-    console, results = Console(), Path(cfg.paths.results) / cfg.data.name
+    console, results = Console(), results_folder(cfg)
     write_table(pd.DataFrame(search.tried), results / f"calibration-{simulator.name}.csv")
     values = {each.parameters[0]: getattr(best, each.parameters[0]) for each in ranges}
     before = {name: getattr(simulator, name) for name in values}

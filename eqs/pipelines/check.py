@@ -17,6 +17,7 @@ from rich.table import Table
 from eqs.data import Dataset, LabelProtocol, Recording, seen_between_frames
 from eqs.events import EventReader
 from eqs.pipelines.command import explained
+from eqs.pipelines.sensors import other_sensor, require_events
 from eqs.processors import available_cores, side_by_side
 
 READ_AT_ONCE_US = 1_000_000
@@ -160,13 +161,17 @@ def check(cfg: DictConfig) -> None:
     protocol.require_known(data.classes)
     look = Inspection(data=data, protocol=protocol, window_us=cfg.window_us, thorough=cfg.thorough)
     places = [(split, each) for split, held in data.sequences().items() for each in held]
+    other = other_sensor(cfg)
+    if other is not None:
+        require_events(data, other)
     workers = min(available_cores(), len(places)) or 1
     looked = side_by_side(partial(look), places, workers) if len(places) > 1 else map(look, places)
     findings = list(track(looked, description="checking", total=len(places)))
     order = {(split, each.name): index for index, (split, each) in enumerate(places)}
     findings.sort(key=lambda finding: order[finding.split, finding.name])
     empty = [split for split, held in data.sequences().items() if not held]
-    show(findings, empty, cfg.data.name, Console())
+    chosen = f"{cfg.data.name}{'' if other is None else f' sensor={other.name}'}"
+    show(findings, empty, chosen, Console())
     faulty = [finding for finding in findings if finding.faults]
     if faulty or not findings:
         raise ValueError(advice(findings, faulty))

@@ -16,6 +16,7 @@ from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
 
 from eqs.extras import lacking
 from eqs.pipelines.keys import in_this_command
+from eqs.pipelines.sensors import check_sensor
 
 log = logging.getLogger(__name__)
 Result = TypeVar("Result")
@@ -38,6 +39,7 @@ def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig],
         quiet_libraries()
         try:
             check_seed(cfg)
+            check_sensor(cfg)
             return command(cfg)
         except KeyboardInterrupt as stop:
             kept = str(stop) or "whatever is complete is kept"

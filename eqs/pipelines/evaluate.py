@@ -9,32 +9,34 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
 
 from eqs.data import Dataset, EventSource, MixedEvents
 from eqs.drawing import save_figure
-from eqs.files import short_hash
 from eqs.metrics.grid import fewest_windows
 from eqs.names import BASELINE, MARK
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
+from eqs.pipelines.comparable import comparable_runs
 from eqs.pipelines.judge import require_judge
 from eqs.pipelines.publish import Findings, publish
-from eqs.pipelines.recipe import WEIGHTS, apart, data_hash, differences, recipe
-from eqs.pipelines.resume import LISTED, NAMED_APART
 from eqs.pipelines.reverse import reverse_precision
 from eqs.pipelines.runs import Run, finished_runs
 from eqs.pipelines.sanity import sanity
 from eqs.pipelines.score import score_recordings
 from eqs.pipelines.scoring import find_scoring
+from eqs.pipelines.sensors import OTHERS, named, results_folder, sensor_of
 from eqs.pipelines.timing import phase_times
 from eqs.study import (
     eqs_table,
     has_mixing,
     mixing_curve,
     print_eqs,
+    print_sensors,
     print_study,
+    sensors_table,
     study_table,
     write_table,
 )
@@ -52,7 +54,7 @@ def evaluate(cfg: DictConfig) -> None:
         ValueError: there is neither a finished run nor anything to score.
     """
     console = Console()
-    results = Path(cfg.paths.results) / cfg.data.name
+    results = results_folder(cfg)
     if cfg.sanity:
         sanity(cfg, results, console)
         return
@@ -72,35 +74,12 @@ def evaluate(cfg: DictConfig) -> None:
         if has_mixing(study):
             drawn = save_figure(mixing_curve(study), results / "figures", "mixing")
             console.print(f"[bold]mixing[/bold]: {drawn}")
+        show_sensors(cfg, console)
     else:
         raise ValueError(
             f"Expected a finished run on {cfg.data.name} with this recipe and these data, got "
             "none; type `python train.py sim=esim` first, or repeat the overrides of the training"
         )
-
-
-def comparable_runs(cfg: DictConfig, found: Sequence[Run]) -> list[Run]:
-    """The runs of the configured recipe on the data as they are; others are named and left out.
-
-    A run that started from the weights of another may differ in these: its row says from which.
-    """
-    wanted, data = recipe(cfg), data_hash(dataset(cfg))
-    named = short_hash(wanted)
-    kept = []
-    for run in found:
-        there = {key: value for key, value in run.recipe().items() if key not in NAMED_APART}
-        started = there and run.result.before and apart(there, wanted) <= {WEIGHTS}
-        same = run.result.recipe == named or started
-        if same and run.result.data == data:
-            kept.append(run)
-            continue
-        reasons = differences(there, wanted) if there and not same else []
-        if run.result.data != data:
-            reasons.insert(0, "other data")
-        shown = ", ".join(reasons[:LISTED]) or "another recipe"
-        more = f" and {len(reasons) - LISTED} more" if len(reasons) > LISTED else ""
-        log.info("left out %s: %s%s", run.folder, shown, more)
-    return kept
 
 
 def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
@@ -128,6 +107,7 @@ def study_rows(runs: Sequence[Run]) -> list[dict[str, Any]]:
                 "beside": result.beside,
                 "before": result.before,
                 "caveat": result.caveat,
+                "sensor": result.sensor,
             }
         )
     return rows
@@ -170,6 +150,7 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     times = phase_times(cfg)
     data = dataset(cfg)
     recordings = data.scored_recordings()
+    data.make_events(recordings)
     systems = scored_systems(cfg, runs)
     scoring = find_scoring(cfg, data)  # first: without one, simulating would be in vain
     for source in systems.values():
@@ -206,11 +187,28 @@ def score(cfg: DictConfig, runs: Sequence[Run], results: Path, console: Console)
     console.print(
         f"[bold]judge[/bold]: {found.judge.description} ({found.judge.weights_sha256[:12]})"
     )
+    sensor = sensor_of(data)
+    if sensor is not None:
+        console.print(f"[bold]sensor[/bold]: {sensor.words}")
     console.print(f"[bold]report[/bold]: {results / 'report.html'}")
+    show_sensors(cfg, console)
     phases = times.read()
     # Trainings may have run side by side, so the sum is work, not waiting.
     for phase, seconds in {**phases, "sum of phases": sum(phases.values())}.items():
         console.print(f"  {phase:<24}{seconds:8.1f} s")
+
+
+def show_sensors(cfg: DictConfig, console: Console) -> None:
+    """Join and print what was found with every sensor, where there are several."""
+    folder = Path(cfg.paths.results) / cfg.data.name
+    others = {place.name: place for place in sorted((folder / OTHERS).glob("*-*"))}
+    if not others:
+        return
+    own = instantiate(cfg.data.generator.sensor).definition_hash()
+    table = sensors_table({named(own).label: folder, **others})
+    write_table(table, folder / "sensors.csv")
+    print_sensors(table, console)
+    console.print(f"[bold]sensors[/bold]: {folder / 'sensors.csv'}")
 
 
 def with_reverse(

@@ -26,6 +26,7 @@ from eqs.models.settings import class_of
 from eqs.pipelines.detector import plain, settings_of
 from eqs.pipelines.recipe import data_hash, recipe_hash
 from eqs.pipelines.runs import Run, finished_runs
+from eqs.pipelines.sensors import results_folder, sensor_label, sensor_of
 
 log = logging.getLogger(__name__)
 EMBEDDED_DATA = "dsec_mini"
@@ -107,8 +108,9 @@ def _shows_maps(settings: Mapping[str, Any]) -> bool:
 def find_judge(cfg: DictConfig, data: Dataset | None) -> Found:
     """The judge that is named, else a detector trained on the real stream of this data.
 
-    Of several detectors the one that followed the configured recipe on the data as they are is
-    taken, else the newest; where there is none, the judge that comes with the package.
+    Of several detectors one of the chosen sensor is taken, and among these the one that followed
+    the configured recipe on the data as they are, else the newest; where there is none, the judge
+    that comes with the package.
 
     Raises:
         FileNotFoundError: the named judge does not exist.
@@ -116,14 +118,17 @@ def find_judge(cfg: DictConfig, data: Dataset | None) -> Found:
     require_judge(cfg)
     if cfg.eqs.judge is not None:
         return _given_judge(cfg, data)
-    if not trained_on_real(cfg):
+    found = trained_on_real(cfg)
+    if not found:
         name = shipped()[0]
         log.info("judge: %s, which comes with the package", name)
         return Found(Judge.load(name), Path(cfg.paths.results) / f"judge-{name}", None)
-    recipe, content = recipe_hash(cfg), None if data is None else data_hash(data)
+    recipe, sensor = recipe_hash(cfg), sensor_label(cfg)
+    alike = [run.result.sensor == sensor for run in found]
+    content = data_hash(data) if data is not None and any(alike) else None
     ranks = {
-        (run.result.recipe == recipe, run.result.data == content, run.finished_ns): run
-        for run in trained_on_real(cfg)
+        (same, run.result.recipe == recipe, run.result.data == content, run.finished_ns): run
+        for same, run in zip(alike, found, strict=True)
     }
     run = ranks[max(ranks)]
     name = run.folder.parents[1].name
@@ -133,6 +138,12 @@ def find_judge(cfg: DictConfig, data: Dataset | None) -> Found:
             "their level means little; set eqs.judge to one trained on such data",
             name,
             cfg.data.name,
+        )
+    elif run.result.sensor != sensor:
+        log.warning(
+            "The judge was trained on the real events of %s: its scores rank streams; "
+            "train.py sim=real makes one for the sensor that is chosen",
+            run.result.sensor or "the data set's own sensor",
         )
     elif content is not None and run.result.data != content:
         log.warning(
@@ -163,7 +174,7 @@ def _with_kept_centres(cfg: DictConfig, judge: Judge, data: Dataset | None) -> F
     name = f"judge-{judge.weights_sha256[:12]}"
     if isinstance(judge.network, OwnNetwork):  # of which equal weights may compute another thing
         name += f"-{judge.network.architecture}"
-    folder = Path(cfg.paths.results) / cfg.data.name / name
+    folder = results_folder(cfg) / name
     if (folder / RECORD).is_file():
         kept = Judge.load(folder)
         made = tuple(centre for centre in kept.centres if centre.sha256 not in given)
@@ -177,7 +188,9 @@ def training_content(data: Dataset | None) -> str:
     if data is None:
         return ""
     try:
-        return short_hash([recording.content_hash() for recording in data.recordings("train")])
+        recordings = data.recordings("train")
+        data.make_events(recordings)
+        return short_hash([recording.content_hash() for recording in recordings])
     except (ValueError, OSError):  # not there any more, or never labelled to be trained on
         return ""
 
@@ -218,7 +231,8 @@ def write_judge(cfg: DictConfig, run: Run, data: Dataset, device: torch.device) 
     judge = Judge.from_checkpoint(run.weights, split, own).to(device)
     named = f"RVT-{cfg.model.size}" if own is None else class_of(own).__name__
     binning = {name: cfg.datamodule[name] for name in ("window_us", "count_cutoff")}
-    world = "a rendered world" if cfg.data.name.startswith(EMBEDDED_DATA) else "real recordings"
+    sensor = sensor_of(data)
+    world = "real recordings" if sensor is None else f"a rendered world seen by {sensor.words}"
     judge = replace(
         judge,
         definition=judge.define(**binning),
@@ -241,10 +255,12 @@ def centred(
 ) -> Judge:
     """The judge with centres of more activations, computed on a data set's training recordings."""
     data.prepare()
+    recordings = data.recordings("train")
+    data.make_events(recordings)
     with ExitStack() as stack:
         streams = (
             stack.enter_context(EventReader(r.events_path, r.height, r.width, data.crop_rows))
-            for r in data.recordings("train")
+            for r in recordings
         )
         return judge.centred_on(
             streams, taps, chunk_windows=chunk_windows, content=training_content(data), **chosen

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import logging
+
 from omegaconf import DictConfig
 
 from eqs.data import Dataset, EventSource
 from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
+from eqs.pipelines.sensors import sensor_of
 from eqs.pipelines.timing import PhaseTimes, phase_times
+
+log = logging.getLogger(__name__)
 
 
 @explained
@@ -18,6 +23,11 @@ def prepare(cfg: DictConfig) -> None:
     data = prepare_data(cfg, times)
     with times.measure("remap frames", resumed=True):
         data.make_frames()
+    sensor = sensor_of(data)
+    if sensor is not None:
+        with times.measure("generate data", resumed=True):
+            data.make_events(data.all_recordings())
+        log.info("%s: %s", sensor.words, data.events_said())
     for source in sources:
         prepare_stream(source, data, times)
         source.prepare(data.scored_recordings())

@@ -18,6 +18,7 @@ from eqs.metrics import Judge, Reading
 from eqs.metrics.grid import fewest_windows
 from eqs.pipelines.runs import Run
 from eqs.pipelines.score import Scores
+from eqs.pipelines.sensors import Sensor, sensor_label, sensor_of
 from eqs.pipelines.showcase import RATE_SPAN_US, WINDOW_US, around, choose, detections
 from eqs.study import (
     Correlation,
@@ -77,13 +78,14 @@ def publish(
     anchors = anchor_table(found.scores.anchors, f"eqs_{found.headline.name}")
     write_table(anchors, folder / "anchors.csv")
     protocol = instantiate(cfg.protocol)
-    sensor = data.sensor_hash
+    sensor, other = sensor_of(data), sensor_label(cfg)
     cards = {"mAP protocol": protocol.card()} if found.runs else {}
     write_report(
         folder,
         ReportContent(
             data_name=cfg.data.name,
             data_is_rendered=sensor is not None,
+            sensor=f"sensor {sensor.name}" if sensor is not None and other else "",
             eqs=found.eqs,
             study=found.study,
             correlations=related,
@@ -114,8 +116,8 @@ def anchor_table(rows: Sequence[Mapping[str, Any]], headline: str) -> pd.DataFra
     return means.sort_values(headline, ascending=False).reset_index()
 
 
-def hashes(judge: Judge, headline: Reading, sensor: str | None) -> dict[str, str]:
-    """What identifies the judge, the definition and, where there is one, the reference sensor."""
+def hashes(judge: Judge, headline: Reading, sensor: Sensor | None) -> dict[str, str]:
+    """What identifies the judge, the definition and, where there is one, the rendered sensor."""
     named = {
         "EQS definition": headline.definition.hash,
         "judge's weights (sha256)": judge.weights_sha256,
@@ -123,7 +125,8 @@ def hashes(judge: Judge, headline: Reading, sensor: str | None) -> dict[str, str
     if headline.centre is not None:
         named["judge's centre (sha256)"] = headline.centre.sha256
     if sensor is not None:
-        named["reference sensor"] = sensor
+        known = "reference sensor" if sensor.name == "reference_sensor" else f"sensor {sensor.name}"
+        named[known] = sensor.hash
     return named
 
 

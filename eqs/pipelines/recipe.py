@@ -72,11 +72,13 @@ def recipe_hash(cfg: DictConfig) -> str:
 
 def data_hash(data: Dataset) -> str:
     """Hash of what every recording holds, frames, times, labels and events, split by split."""
+    splits = {
+        split: [data.load(places) for places in sequences]
+        for split, sequences in data.sequences().items()
+    }
+    data.make_events([recording for held in splits.values() for recording in held])
     return short_hash(
-        {
-            split: [data.load(places).content_hash() for places in sequences]
-            for split, sequences in data.sequences().items()
-        }
+        {split: [each.content_hash() for each in held] for split, held in splits.items()}
     )
 
 

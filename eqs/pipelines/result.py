@@ -32,6 +32,9 @@ class RunResult:
             started from the weights of another run.
         caveat: why its simulator is none like others; empty where it is one.
         setting: what its simulator saw of frames, in words.
+        sensor: the event camera of the real events, name and hash; empty where that is the data
+            set's own.
+        tested_on: hash of the test recordings, where these were chosen after the training.
     """
 
     simulator: str
@@ -46,6 +49,13 @@ class RunResult:
     stages: tuple[Stage, ...]
     caveat: str = ""
     setting: str = ""
+    sensor: str = ""
+    tested_on: str = ""
+
+    @property
+    def saw_real(self) -> bool:
+        """Whether it was trained on real events, at any stage."""
+        return any(REFERENCE in stage for stage in self.stages)
 
     @property
     def plain(self) -> bool:
@@ -87,7 +97,7 @@ class RunResult:
         try:
             own, real = (Accuracy(**record[stream]) for stream in ("own", "real"))
             record.setdefault("stages", [{record["simulator"]: 1.0}])  # before there were others
-            for name in ("caveat", "setting"):
+            for name in ("caveat", "setting", "sensor", "tested_on"):
                 record.setdefault(name, "")
             kept = {field.name: record[field.name] for field in fields(cls)}
         except (KeyError, TypeError) as error:

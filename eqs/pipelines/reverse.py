@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hydra.utils import instantiate
-
-from eqs.data import Dataset, EventSource, RecordedEvents
+from eqs.data import Dataset, EventSource
 from eqs.pipelines.runs import Run
-from eqs.pipelines.train import build_task
+from eqs.pipelines.testing import accuracies
 
 
 def reverse_precision(
@@ -27,19 +25,4 @@ def reverse_precision(
     """
     for source in systems.values():
         source.prepare(data.recordings("test"))
-    config = run.config()
-    protocol = instantiate(config.protocol)
-    task = build_task(config, protocol, list(systems))
-    datamodule = instantiate(config.datamodule)(
-        dataset=data, protocol=protocol, source=RecordedEvents(), tests=systems
-    )
-    trainer = instantiate(
-        config.trainer,
-        devices=1,
-        strategy="auto",
-        logger=False,
-        enable_checkpointing=False,
-        enable_progress_bar=False,
-    )
-    trainer.test(task, datamodule, ckpt_path=run.weights, verbose=False)
-    return {name: task.measured[name].map for name in systems}
+    return {name: found.map for name, found in accuracies(run, data, systems).items()}

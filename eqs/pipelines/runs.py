@@ -25,9 +25,12 @@ class Run:
 
     Args:
         folder: `<runs>/<data>/<stream>/<recipe and data>-seed<seed>`.
+        sensor: the event camera on whose events it was tested, where that is another than those
+            that the training was tested on.
     """
 
     folder: Path
+    sensor: str = ""
 
     @property
     def checkpoints(self) -> Path:
@@ -45,14 +48,19 @@ class Run:
         return self.folder / "weights.ckpt"
 
     @property
+    def record(self) -> Path:
+        """What was measured, whether it exists or not."""
+        return self.folder / f"result{'-' * bool(self.sensor)}{self.sensor}.json"
+
+    @property
     def finished(self) -> bool:
         """Whether training and testing are complete."""
-        return (self.folder / "result.json").exists()
+        return self.record.exists()
 
     @property
     def finished_ns(self) -> int:
         """When it was finished, nanoseconds since 1970."""
-        return (self.folder / "result.json").stat().st_mtime_ns
+        return self.record.stat().st_mtime_ns
 
     @cached_property
     def result(self) -> RunResult:
@@ -61,7 +69,7 @@ class Run:
         Raises:
             ValueError: the record lacks something, as those of older versions may.
         """
-        return RunResult.load(self.folder / "result.json")
+        return RunResult.load(self.record)
 
     @property
     def _replaced(self) -> Run:
@@ -77,7 +85,7 @@ class Run:
 
     def finish(self, result: RunResult) -> None:
         """Mark the run as finished; the one that it replaces, if any, goes."""
-        result.save(self.folder / "result.json")
+        result.save(self.record)
         shutil.rmtree(self._replaced.folder, ignore_errors=True)
 
     def recipe(self) -> dict[str, Any]:

@@ -39,6 +39,7 @@ def sanity(cfg: DictConfig, results: Path, console: Console) -> None:
     data = dataset(cfg)
     scoring = find_scoring(cfg, data)
     everything = data.scored_recordings()
+    data.make_events(everything)
     recordings = everything[: cfg.sanity_recordings]
     rest = everything[len(recordings) :]
     rows: list[dict[str, Any]] = []

@@ -11,6 +11,7 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from eqs.files import read_json, write_json
+from eqs.pipelines.sensors import results_folder
 
 
 @dataclass(frozen=True)
@@ -44,4 +45,4 @@ class PhaseTimes:
 
 def phase_times(cfg: DictConfig) -> PhaseTimes:
     """The times of the configured study, beside its results."""
-    return PhaseTimes(Path(cfg.paths.results) / cfg.data.name / "timings")
+    return PhaseTimes(results_folder(cfg) / "timings")

@@ -15,18 +15,19 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
 
-from eqs.data import Dataset, EventSource, LabelProtocol, MixedEvents, RecordedEvents
+from eqs.data import Dataset, EventSource, LabelProtocol, RecordedEvents
 from eqs.files import one_at_a_time, short_hash
-from eqs.pipelines.build import event_source
+from eqs.pipelines.build import dataset, event_source
 from eqs.pipelines.command import explained
-from eqs.pipelines.detector import build_detector, record_of
 from eqs.pipelines.judge import write_judge
 from eqs.pipelines.prepare import prepare_data, prepare_stream
 from eqs.pipelines.recipe import data_hash, recipe, recipe_hash, trials
 from eqs.pipelines.result import RunResult
 from eqs.pipelines.resume import check_checkpoint, checkpoint_path, identity_of, shorter_config
 from eqs.pipelines.runs import Run
+from eqs.pipelines.sensors import other_sensor, own_events, sensor_label
 from eqs.pipelines.start import Start, start_of, trained_as
+from eqs.pipelines.testing import build_task, on_other_sensor, sees_real, streams_to_test
 from eqs.pipelines.timing import PhaseTimes, phase_times
 from eqs.pipelines.trainer import build_trainer, check_trainer, resumable
 from eqs.processors import available_cores
@@ -50,10 +51,12 @@ def train(cfg: DictConfig) -> RunResult | None:
     build_task(cfg, protocol, []).configure_optimizers()
     check_checkpoint(cfg)
     recipe(cfg)
-    times = phase_times(cfg)
-    data = prepare_data(cfg, times)
+    # What sees no real events does not depend on who recorded them.
+    own = cfg if sees_real(source) else own_events(cfg)
+    times = phase_times(own)
+    data = prepare_data(own, times)
     protocol.require_known(data.classes)
-    job = Job.of(cfg, source, data, protocol)
+    job = Job.of(own, source, data, protocol)
     if not first:  # a process that the first one started, which holds the lock and reports
         execute(job, times)
         return None
@@ -62,8 +65,21 @@ def train(cfg: DictConfig) -> RunResult | None:
             log.info("%s is finished already; overwrite=true trains it again", job.run.folder)
         elif not execute(job, times):
             return None
-    show(job.run)
-    return job.run.result
+    run = job.run if own is cfg else tested_elsewhere(job.run, cfg)
+    show(run)
+    return run.result
+
+
+def tested_elsewhere(run: Run, cfg: DictConfig) -> Run:
+    """The run with its accuracy on the events of the chosen sensor, if another one is chosen."""
+    other = other_sensor(cfg)
+    if other is None:
+        return run
+    if torch.distributed.is_initialized():  # its processes would wait for each other
+        log.info("type python evaluate.py sensor=NAME to test it on %s", other.words)
+        return run
+    with phase_times(cfg).measure(f"test on {other.name}", resumed=True):
+        return on_other_sensor(run, other, dataset(cfg), cfg)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,14 +165,6 @@ def execute(job: Job, times: PhaseTimes) -> bool:
     return True
 
 
-def streams_to_test(source: EventSource) -> dict[str, EventSource]:
-    """The events to test on: those of the training, and the recorded ones where they differ."""
-    own = source.evaluation if isinstance(source, MixedEvents) else source
-    if isinstance(own, RecordedEvents):
-        return {"real": own}
-    return {"own": own, "real": RecordedEvents()}
-
-
 def finish(
     job: Job,
     trainer: lightning.Trainer,
@@ -178,6 +186,7 @@ def finish(
             caveat=job.source.caveat,
             setting=job.source.setting,
             seed=job.cfg.seed,
+            sensor=sensor_label(job.cfg),
             recipe=recipe_hash(job.cfg),
             data=job.identity["data"],
             own=task.measured.get("own", real),  # a detector of real events has one test
@@ -188,21 +197,13 @@ def finish(
     )
 
 
-def build_task(cfg: DictConfig, protocol: LabelProtocol, test_streams: list[str]) -> DetectionTask:
-    """The configured detector in its training module."""
-    model, record = build_detector(cfg), record_of(cfg)
-    task: DetectionTask = instantiate(cfg.task)(
-        model=model, protocol=protocol, test_streams=test_streams, record=record
-    )
-    return task
-
-
 def show(run: Run) -> None:
     """Print both mAPs of a run and its folder, which `model.weights` takes."""
     result, own, real = run.result, run.result.own, run.result.real
+    seen_by = f" of {result.sensor}" * bool(result.sensor)
     Console().print(
         f"[bold]{result.system}[/bold] seed {result.seed}: "
         f"own test mAP {100 * own.map:.1f} (AP50 {100 * own.map_50:.1f}), "
-        f"real test mAP {100 * real.map:.1f} (AP50 {100 * real.map_50:.1f})"
+        f"real test mAP{seen_by} {100 * real.map:.1f} (AP50 {100 * real.map_50:.1f})"
     )
     Console(soft_wrap=True).print(f"[bold]run[/bold]: {run.folder}")

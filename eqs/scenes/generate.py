@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from eqs.scenes.labels import LabelRule
 from eqs.scenes.sensor import ReferenceSensor
 from eqs.scenes.sensor_stream import EventSensor
 from eqs.scenes.sequence import RECORD, SPLITS, VERSION, SequencePlan
+from eqs.scenes.watching import Watching
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +30,9 @@ class DSECMini:
         sequences: number of recordings per split.
         frames: frames per recording, 20 per second.
         seed: draws every recording; one seed is one data set, whatever the worker count.
-        sensor: the event camera.
+        sensor: the event camera whose events lie with the frames.
+        other_sensor: another one, whose events are looked at instead; they lie beside, see
+            `Watching`.
         workers: processes; None for one per core.
 
     Raises:
@@ -41,6 +44,7 @@ class DSECMini:
     frames: int = 60
     seed: int = 0
     sensor: EventSensor = field(default_factory=ReferenceSensor)
+    other_sensor: EventSensor | None = None
     workers: int | None = None
 
     def __post_init__(self) -> None:
@@ -61,8 +65,8 @@ class DSECMini:
 
     @property
     def sensor_hash(self) -> str:
-        """Hash of the event camera's parameters."""
-        return self.sensor.definition_hash()
+        """Hash of the parameters of the event camera that is looked at."""
+        return (self.other_sensor or self.sensor).definition_hash()
 
     def recordings(self) -> list[SequencePlan]:
         """All sequences, in the order of their names."""
@@ -97,6 +101,51 @@ class DSECMini:
                     self._generate(root)
         return root
 
+    def events_file(self, root: Path | str, name: str) -> Path | None:
+        """Where another sensor's events of a recording lie; None where they lie with the frames."""
+        other = self._watching(root)
+        return None if other is None else other.file(name)
+
+    def record(self, root: Path | str, names: Collection[str]) -> None:
+        """Make another sensor's events of these recordings, where that is chosen and they lack.
+
+        Raises:
+            ValueError: a folder is in the way, which was not written here.
+        """
+        other = self._watching(root)
+        if other is not None:
+            other.record(names)
+
+    def events_said(self, root: Path | str) -> str:
+        """How many events there are by day and by night, in a sentence."""
+        other = self._watching(root)
+        manifest = Path(root) / "manifest.json"
+        records = read_json(manifest)["sequences"] if other is None else other.records()
+        plans = {plan.name: plan for plan in self.recordings()}
+        width, height = (int(number) for number in self.size.split("x"))
+        said = []
+        for light in ("day", "night"):
+            held = [each for each in records if plans[each["name"]].night == (light == "night")]
+            seconds = 1e-6 * sum(each["duration_us"] for each in held)
+            if held:
+                count, on = (sum(each[key] for each in held) for key in ("events", "on_events"))
+                rate = count / seconds
+                said.append(
+                    f"{rate:,.0f} events per second by {light} ({rate / width / height:.1f} per "
+                    f"pixel, {100 * on / max(count, 1):.0f} % ON, {len(held)} recordings)"
+                )
+        return " and ".join(said)
+
+    def _watching(self, root: Path | str) -> Watching | None:
+        if self.other_sensor is None or self.sensor_hash == self.sensor.definition_hash():
+            return None
+        return Watching(
+            recordings={plan.name: plan for plan in self.recordings()},
+            sensor=self.other_sensor,
+            root=Path(root),
+            workers=self.workers,
+        )
+
     def _is_complete(self, root: Path) -> bool:
         manifest = root / "manifest.json"
         if not manifest.is_file():
@@ -113,7 +162,7 @@ class DSECMini:
             root / "manifest.json",
             {
                 "parameters": self._description(),
-                "sensor_hash": self.sensor_hash,
+                "sensor_hash": self.sensor.definition_hash(),
                 "sequences": records,
             },
         )

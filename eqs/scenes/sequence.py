@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -28,6 +28,7 @@ LEAD_IN_US: Final = 60_000  # events before the first frame
 LEAD_OUT_US: Final = 10_000  # and after the last one
 SPLITS: Final = {"train": 0, "val": 1, "test": 2}
 RECORD: Final = "sequence.json"
+EVENTS: Final = Path("events/left/events.h5")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,12 +136,33 @@ class SequencePlan:
         Raises:
             ValueError: a folder of that name is there, which was not written here.
         """
-        folder = root / self.split / self.name
-        if (folder / RECORD).is_file():
-            record = read_json(folder / RECORD)
-            if record["description"] == self.description():
-                return record
-        elif folder.exists():
+        return self._once(root / self.split / self.name, self._render)
+
+    def write_events(self, root: Path) -> dict[str, Any]:
+        """Write what the event camera alone leaves, into the same folder below another root.
+
+        Raises:
+            ValueError: as `write` says.
+        """
+        return self._once(root / self.split / self.name, self._watch)
+
+    def kept(self, root: Path) -> dict[str, Any] | None:
+        """The record of what lies below `root`, if it was written with this very description."""
+        path = root / self.split / self.name / RECORD
+        if not (path.is_file() and self.events_file(root).is_file()):
+            return None
+        record = read_json(path)
+        return record if record["description"] == self.description() else None
+
+    def events_file(self, root: Path) -> Path:
+        """Where the events lie below a root."""
+        return root / self.split / self.name / EVENTS
+
+    def _once(self, folder: Path, make: Callable[[Path], dict[str, Any]]) -> dict[str, Any]:
+        record = self.kept(folder.parents[1])
+        if record is not None:
+            return record
+        if folder.exists() and not (folder / RECORD).is_file():
             raise ValueError(
                 f"Expected no folder at {folder} but those written here, got another; set "
                 "data.root to a new folder"
@@ -150,10 +172,20 @@ class SequencePlan:
             if old.exists():
                 shutil.rmtree(old)
         partial.mkdir(parents=True)
-        record = self._render(partial)
+        record = make(partial)
         write_json(partial / RECORD, record)
         partial.replace(folder)
         return record
+
+    def _watch(self, folder: Path) -> dict[str, Any]:
+        events, on = self._write_events(folder, self.world(), self.duration_us)
+        return {
+            "name": self.name,
+            "duration_us": self.duration_us,
+            "events": events,
+            "on_events": on,
+            "description": self.description(),
+        }
 
     def _render(self, folder: Path) -> dict[str, Any]:
         world, times, duration_us = self.world(), self.frame_times_us, self.duration_us
@@ -194,14 +226,14 @@ class SequencePlan:
         return exposure.time_us
 
     def _write_events(self, folder: Path, world: DrivingWorld, duration_us: int) -> tuple[int, int]:
-        (folder / "events/left").mkdir(parents=True)
+        (folder / EVENTS).parent.mkdir(parents=True)
         stream = self.sensor.start(
             self.height, self.width, noise_key=(*self.key, 3), start_us=self.t_offset_us
         )
         instants = range(0, duration_us + 1, self.sensor.step_us)
         total = on = 0
         with EventWriter(
-            folder / "events/left/events.h5",
+            folder / EVENTS,
             self.height,
             self.width,
             t_offset_us=self.t_offset_us,

@@ -17,6 +17,7 @@ from eqs.study.mixing import has_mixing, mixing_curve, mixing_points
 from eqs.study.printed import printed_accuracy, printed_scores
 from eqs.study.report import ReportContent, ReportFigure, render_report, write_report
 from eqs.study.sanity import order_faults, sanity_figure, sanity_table, severity_correlations
+from eqs.study.sensors import print_sensors, sensors_table
 from eqs.study.tables import (
     Drops,
     drops,
@@ -51,6 +52,7 @@ __all__ = [
     "print_calibration",
     "print_eqs",
     "print_sanity",
+    "print_sensors",
     "print_study",
     "printed_accuracy",
     "printed_scores",
@@ -61,6 +63,7 @@ __all__ = [
     "sanity_table",
     "scaled_score",
     "score_against_accuracy",
+    "sensors_table",
     "sequence_dots",
     "severity_correlations",
     "simulated",

@@ -29,7 +29,7 @@ def print_study(study: pd.DataFrame, console: Console) -> None:
     several = ["seeds"] if systems["seeds"].gt(1).any() else []
     mixed = ["trained_on"] if composed(systems).any() else []
     names = ["system", *mixed, *several, *MAP_COLUMNS, *Drops._fields, "eqs"]
-    _print(_chosen(systems, names), "Detection accuracy (mAP, drops: x 100)", console)
+    print_table(_chosen(systems, names), "Detection accuracy (mAP, drops: x 100)", console)
 
 
 def print_eqs(eqs: pd.DataFrame, console: Console, fewest_windows: int = 2) -> None:
@@ -37,14 +37,14 @@ def print_eqs(eqs: pd.DataFrame, console: Console, fewest_windows: int = 2) -> N
 
     Below stands which sequences the means cover where these are not all, and which are short.
     """
-    _print(scores_table(eqs), "EQS by sequence (higher is better)", console)
+    print_table(scores_table(eqs), "EQS by sequence (higher is better)", console)
     means = summarise_eqs(eqs)
     fewer = ["anchored"] if (means["anchored"] < means["sequences"]).any() else []
     names = ["system", "sequences", "eqs", *fewer, "eqs_chance", "eqs_ceiling", "eqs_scaled"]
     variants = [name for name in score_columns(means) if name != "eqs"]
-    _print(_chosen(means, names), "Event Quality Score (higher is better)", console)
+    print_table(_chosen(means, names), "Event Quality Score (higher is better)", console)
     if variants:
-        _print(_chosen(means, ["system", *variants]), "EQS by activation", console)
+        print_table(_chosen(means, ["system", *variants]), "EQS by activation", console)
     for note in notes(eqs, fewest_windows):
         console.print(f"[bold]note[/bold]: {note}")
 
@@ -60,7 +60,7 @@ def print_sanity(
         )
         for row in table.to_dict("records")
     )
-    _print(Table(header=("corruption", headline), rows=rows), "Sanity battery", console)
+    print_table(Table(header=("corruption", headline), rows=rows), "Sanity battery", console)
     for name in [headline, *(name for name in readings(table) if name != headline)]:
         faults, unknown = order_faults(table, name, expected), untested(table, name, expected)
         verdict = "as expected" if not faults else "not as expected, " + ", ".join(faults)
@@ -77,7 +77,7 @@ def _chosen(frame: pd.DataFrame, names: list[str]) -> Table:
     return Table(header=tuple(names), rows=rows)
 
 
-def _print(table: Table, title: str, console: Console) -> None:
+def print_table(table: Table, title: str, console: Console) -> None:
     """Print a table, in several that begin alike where the terminal is too narrow for one."""
     # A heading has a word a line; a name, which others may want to copy, stays whole.
     corner, *others = table.header

@@ -52,6 +52,7 @@ class ReportContent:
         data_name: the data set's name, as in `results/<data>`.
         data_is_rendered: the "real" stream comes from a reference sensor watching a rendered
             world, and is not a recording.
+        sensor: what that sensor is called, where it is another than the reference sensor.
         eqs: one row per (system, sequence).
         study: one row per (system, seed); None where no detector was trained.
         correlations: of the headline score with every target.
@@ -77,6 +78,7 @@ class ReportContent:
     timings: Mapping[str, float] = field(default_factory=dict)
     unfinished: Sequence[str] = ()
     judge: str = ""
+    sensor: str = ""
     fewest_windows: int = 2
 
 
@@ -106,7 +108,7 @@ def render_report(content: ReportContent) -> str:
         mixed=content.study is not None and bool(composed(content.study).any()),
         notes=notes(content.eqs, content.fewest_windows),
         answer=answer(content.eqs, content.study, content.correlations),
-        real="reference sensor" if content.data_is_rendered else "real sensor",
+        real=content.sensor or ("reference sensor" if content.data_is_rendered else "real sensor"),
         tables=_tables(content),
         figures=[_figure(*entry) for entry in content.figures.values()],
         cards={name: list(card.items()) for name, card in content.cards.items()},

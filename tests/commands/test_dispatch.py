@@ -46,6 +46,8 @@ def test_a_mistyped_verb_is_answered_with_the_nearest(monkeypatch):
 
 def test_flags_and_files_become_keys():
     assert with_flags(["a=1", "--eqs", "--sanity"]) == ["a=1", "score=true", "sanity=true"]
+    # Hydra reads nothing between keys and what follows its own flags.
+    assert with_flags(["--eqs", "-m", "a=1,2"]) == ["-m", "a=1,2", "score=true"]
     given = ["--config-dir", "my", "one.h5", "two.h5"]
     assert with_files(given) == [*given[:2], "simulated=one.h5", "real=two.h5"]
     given = ["-m", "one.h5", "height=3", "two.h5", "three"]

@@ -8,7 +8,7 @@ import pytest
 from eqs.commands.configured import CONFIGS, CONFIGURED
 from eqs.commands.help_page import configured_page, first_comment, groups, keys, options
 
-WIDEST, LONGEST = 104, 140
+WIDEST, LONGEST = 104, 150
 
 
 @pytest.mark.parametrize("verb", CONFIGURED)

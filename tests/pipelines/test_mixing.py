@@ -14,7 +14,8 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 import eqs
 from eqs.data import RecordedEvents
 from eqs.pipelines.build import dataset, event_source
-from eqs.pipelines.evaluate import comparable_runs, evaluate, scored_systems, study_rows
+from eqs.pipelines.comparable import comparable_runs
+from eqs.pipelines.evaluate import evaluate, scored_systems, study_rows
 from eqs.pipelines.judge import trained_on_real
 from eqs.pipelines.recipe import WEIGHTS, recipe, recipe_hash
 from eqs.pipelines.resolvers import register_resolvers

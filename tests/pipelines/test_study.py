@@ -208,7 +208,8 @@ def test_training_on_real_events_leaves_a_judge(place: Path, trained: dict[str, 
     judge = Judge.load(folders["real"])
     assert judge.definition == Definition(architecture="rvt-tiny-split1")
     assert {centre.tap for centre in judge.centres} == set(KEPT_TAPS)
-    assert judge.description.endswith("of dsec_mini_smoke, a rendered world")
+    seen = "a rendered world seen by reference_sensor (51f1ba55d567)"
+    assert judge.description.endswith(f"of dsec_mini_smoke, {seen}")
     (folders["real"] / "judge.json").unlink()  # as older runs have none
     again = find_scoring(configured(place, name="evaluate"), None).judge
     assert [c.sha256 for c in again.centres] == [c.sha256 for c in judge.centres]
