@@ -12,7 +12,8 @@ from eqs.content import content_hash
 from eqs.data import EventSource, MixedEvents
 from eqs.files import short_hash
 from eqs.models.checkpoint import RECORD, read_content, weights_file
-from eqs.pipelines.result import Stage
+from eqs.names import REFERENCE
+from eqs.pipelines.result import RunResult, Stage
 from eqs.pipelines.runs import Run
 
 UNKNOWN = "weights"  # trained here, but its record does not lie beside them
@@ -49,10 +50,20 @@ def start_of(cfg: DictConfig) -> Start | None:
     content = content_hash(path)
     for run in (Run(path.parent), Run(path.parent.parent)):  # its weights, or a checkpoint
         if run.finished:
-            return Start(name=run.result.simulator, stages=run.result.stages, weights=content)
+            return Start(name=run.result.simulator, stages=named(run.result), weights=content)
     if RECORD not in read_content(path):
         return None
     return Start(name=UNKNOWN, stages=({UNKNOWN: 1.0},), weights=content)
+
+
+def named(result: RunResult) -> tuple[Stage, ...]:
+    """The stages of a training, whose last names the sensor of real events if it was a chosen one.
+
+    For what follows may see those of another sensor.
+    """
+    *before, last = result.stages
+    seen = f"{REFERENCE} of {result.sensor}" if result.sensor else REFERENCE
+    return (*before, {seen if name == REFERENCE else name: last[name] for name in last})
 
 
 def trained_as(source: EventSource, start: Start | None) -> Mapping[str, Any]:

@@ -227,8 +227,8 @@ def test_a_run_that_started_from_another_may_differ_in_its_weights_alone(
 ) -> None:
     cfg = configured(tmp_path, name="evaluate")
     content = "here"
-    monkeypatch.setattr("eqs.pipelines.evaluate.dataset", lambda cfg: None)
-    monkeypatch.setattr("eqs.pipelines.evaluate.data_hash", lambda data: content)
+    monkeypatch.setattr("eqs.pipelines.comparable.dataset", lambda cfg: None)
+    monkeypatch.setattr("eqs.pipelines.comparable.data_hash", lambda data: content)
     plain = {**recipe(cfg), "seed": 0}
     stages = ({"esim": 1.0}, {"real": 1.0})
     other = result_of("esim_then_real", data=content, stages=stages)

@@ -9,6 +9,7 @@ from eqs.data import Recording
 from eqs.metrics import Judge
 from eqs.metrics.definition import VERSION_1
 from eqs.pipelines.publish import anchor_table, hashes, mean_maps, same_sensor
+from eqs.pipelines.sensors import Sensor
 
 
 def test_anchors_are_means_over_recordings_with_the_highest_headline_first():
@@ -63,7 +64,9 @@ def test_what_a_score_hangs_on_is_named_by_its_hashes(make_events):
         "judge's weights (sha256)": raw.weights_sha256,
     }
     centred = raw.centred_on([make_events(3000, 32, 32)])
-    named = hashes(centred, centred.reading(**VERSION_1), "51f1")
+    reading = centred.reading(**VERSION_1)
+    named = hashes(centred, reading, Sensor("reference_sensor", "51f1"))
     assert named["judge's centre (sha256)"] == centred.centres[0].sha256
     assert named["reference sensor"] == "51f1"
+    assert hashes(centred, reading, Sensor("gen4", "e7a7"))["sensor gen4"] == "e7a7"
     assert named["EQS definition"] != plain["EQS definition"]

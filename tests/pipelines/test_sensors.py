@@ -27,6 +27,7 @@ from eqs.pipelines.sensors import (
     results_folder,
     sensor_label,
 )
+from eqs.pipelines.start import named as named_stages
 from eqs.pipelines.testing import sees_real
 from eqs.pipelines.train import run_of, train
 from eqs.simulators import ESIM
@@ -136,6 +137,13 @@ def test_only_streams_with_real_events_depend_on_the_sensor(tmp_path: Path) -> N
     assert [sees_real(each) for each in (mixed(0.1), mixed(0.0), mixed(0.0, "real"))] == [
         True, False, True
     ]  # fmt: skip
+
+
+def test_what_starts_from_real_events_says_of_which_sensor(result_of) -> None:
+    own, other = result_of("real"), result_of("real", sensor=DAVIS)
+    assert named_stages(own) == ({"real": 1.0},)
+    assert named_stages(other) == ({f"real of {DAVIS}": 1.0},)
+    assert named_stages(result_of("esim", sensor=DAVIS)) == ({"esim": 1.0},)
 
 
 def folders(place: Path, sim: str, *chosen: str) -> Path:
