@@ -75,7 +75,8 @@ def tested_elsewhere(run: Run, cfg: DictConfig) -> Run:
     other = other_sensor(cfg)
     if other is None:
         return run
-    if torch.distributed.is_initialized():  # its processes would wait for each other
+    processes = torch.distributed.is_available() and torch.distributed.is_initialized()
+    if processes:  # they would wait for each other
         log.info("type python evaluate.py sensor=NAME to test it on %s", other.words)
         return run
     with phase_times(cfg).measure(f"test on {other.name}", resumed=True):
