@@ -25,7 +25,8 @@ def test_a_page_says_what_a_command_is_for_and_how_it_is_typed(verb):
 def test_every_group_option_and_value_has_a_line(verb):
     page = configured_page(verb, verb).splitlines()
     found = groups(verb)
-    assert len({group.name for group in found}) == len(found) >= 2
+    assert len({group.name for group in found}) == len(found)
+    assert len(found) >= 2 or verb == "trial"  # whose parts all stand in its own file
     for group in found:
         assert f"{group.name}={group.default}   {group.line}" in page
         for name, path in options(group.name).items():

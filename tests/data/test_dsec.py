@@ -78,6 +78,9 @@ def test_generator_makes_what_is_missing(tmp_path, make_recording):
         def generate(self, root):
             make_recording(root / "train" / "train_a")
 
+        def events_file(self, root, name):
+            return None
+
     data = folder(tmp_path / "new", generator=Generator())
     data.prepare()
     assert len(data.recordings("train")) == 1
