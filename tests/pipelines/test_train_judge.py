@@ -16,7 +16,7 @@ from eqs.training.judge_task import JudgeTask
 
 CONFIGS = Path(__file__).parents[2] / "eqs/configs"
 SMALL = (
-    "lessons.count=3", "lessons.held_out=1", "lessons.windows=4", "lessons.sizes={32x32: 1.0}",
+    "lessons.count=3", "lessons.held_out=1", "lessons.windows=4",
     "recipe.epochs=2", "recipe.steps_per_epoch=2", "recipe.windows=3", "recipe.labelled=1",
     "recipe.canvases=[[32,32,2]]", "model=rvt_tiny", "trainer=cpu", "trainer.precision=32-true",
 )  # fmt: skip
@@ -27,6 +27,7 @@ def run(place: Path, out: str, *overrides: str) -> Path:
     paths = [f"paths.datasets={place / 'data'}", f"paths.runs={place / out / 'runs'}"]
     with initialize_config_dir(str(CONFIGS), version_base="1.3"):
         cfg = compose("train-judge", [*SMALL, *paths, f"out={place / out}", *overrides])
+    cfg.lessons.sizes = {"32x32": 1.0}
     pipeline.train_judge(cfg)
     return place / out
 
