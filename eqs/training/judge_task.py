@@ -94,7 +94,9 @@ class JudgeTask(lightning.LightningModule):
         """The numbers of the steps of an epoch."""
         per_epoch = self.learnt.steps_per_epoch
         numbers = list(range(self.epochs * per_epoch))
-        sampler = StepSampler(per_epoch, epoch=self.trainer.current_epoch)
+        # A resumed trainer takes its first batch before it names the epoch.
+        done = self.trainer.fit_loop.total_batch_idx + 1
+        sampler = StepSampler(per_epoch, epoch=done // per_epoch)
         return DataLoader(numbers, sampler=sampler, batch_size=None)  # type: ignore[arg-type]
 
     def configure_optimizers(self) -> OptimizerLRScheduler:
