@@ -30,9 +30,6 @@ class FirstOrderSensor(EventSensor):
         \langle n(t) n(t + s) \rangle = \sigma^2 e^{-|s| / \tau_n}
 
     Args:
-        threshold_on_log: mean ON threshold, natural-log contrast.
-        threshold_off_log: mean OFF threshold, natural-log contrast, positive.
-        threshold_mismatch_log: standard deviation of a pixel's threshold over the array.
         dark_lux: light that causes as much current as the dark.
         bias_time_us: time constant in bright light, us.
         dim_time_us_lux: what dim light adds to it, us times lux.
@@ -106,21 +103,20 @@ class FirstOrderStream(SensorStream):
         """Draw the sensor's fixed pattern."""
         # A pixel remembers the log light, its output, its noise and the memorised value.
         super().__init__(
-            height, width, rows=4, step_us=sensor.step_us, row_service_us=0.0, start_us=start_us
+            sensor,
+            height,
+            width,
+            rows=4,
+            row_service_us=0.0,
+            noise_key=noise_key,
+            start_us=start_us,
         )
-        self._sensor, count = sensor, height * width
-        pattern = np.random.default_rng(np.random.SeedSequence([sensor.seed, height, width]))
-        floor = 0.2 * min(sensor.threshold_on_log, sensor.threshold_off_log)
-        means = np.array([[sensor.threshold_on_log], [sensor.threshold_off_log]])
-        spread = sensor.threshold_mismatch_log * pattern.standard_normal((2, count))
+        self._sensor, count, pattern = sensor, height * width, self._pattern
         drift = sensor.leak_log_per_s * pattern.standard_normal(count)
         hot = pattern.random(count) < sensor.hot_pixel_fraction
         sign = np.where(pattern.random(count) < 0.5, -1.0, 1.0)
         drift[hot] += (sign * pattern.exponential(sensor.hot_pixel_log_per_s, count))[hot]
-        self._thresholds = np.maximum(means + spread, floor).astype(np.float32)
         self._drift = (1e-6 * sensor.step_us * drift).astype(np.float32)
-        keys = np.random.SeedSequence([sensor.seed, *noise_key]).generate_state(2, np.uint64)
-        self._key, self._phase_seed = np.uint64(keys[0]), int(keys[1])
         self._scan = Scan(
             dark_lux=sensor.dark_lux,
             bias_us=sensor.bias_time_us,
@@ -137,9 +133,7 @@ class FirstOrderStream(SensorStream):
         rng = np.random.default_rng(self._phase_seed)
         self._state[0] = self._state[1] = np.log(picture + self._sensor.dark_lux)
         self._state[2] = self._sensor.noise_log * rng.standard_normal(len(picture))
-        on, off = self._thresholds
-        place = rng.random(len(picture), dtype=np.float32)
-        self._state[3] = self._state[1] - on + place * (on + off)
+        self._state[3] = self._memories(self._state[1], rng)
 
     def _run(self, picture: NDArray[np.float32], state: NDArray[np.float32], room: Array) -> int:
         return scan_pixels(

@@ -31,9 +31,6 @@ class ReferenceSensor(EventSensor):
     published measurements and are not tuned to results: `definition_hash` says which they were.
 
     Args:
-        threshold_on_log: mean ON threshold, natural-log contrast.
-        threshold_off_log: mean OFF threshold, natural-log contrast, positive.
-        threshold_mismatch_log: standard deviation of a pixel's threshold over the array.
         photocurrent_fa_per_lux: photocurrent per lux at the focal plane, fA.
         dark_current_fa: photodiode dark current, fA.
         amplifier_gain: voltage gain of the photoreceptor's feedback amplifier.
@@ -144,35 +141,25 @@ class ReferenceStream(SensorStream):
         """Draw the sensor's fixed pattern."""
         # A pixel remembers its output, the slope per second, the memorised value, refractory us.
         super().__init__(
+            sensor,
             height,
             width,
             rows=4,
-            step_us=sensor.step_us,
             row_service_us=sensor.row_service_us,
+            noise_key=noise_key,
             start_us=start_us,
         )
         self._circuit = sensor.circuit()
-        count = height * width
-        pattern = np.random.default_rng(np.random.SeedSequence([sensor.seed, height, width]))
-        spread = sensor.threshold_mismatch_log
-        floor = 0.2 * min(sensor.threshold_on_log, sensor.threshold_off_log)
-        means = np.array([[sensor.threshold_on_log], [sensor.threshold_off_log]])
-        thresholds = np.maximum(means + spread * pattern.standard_normal((2, count)), floor)
+        count, pattern = height * width, self._pattern
         leak_hz = sensor.leak_hz * np.exp(sensor.leak_mismatch * pattern.standard_normal(count))
         hot = pattern.random(count) < sensor.hot_pixel_fraction
         leak_hz[hot] += pattern.exponential(sensor.hot_pixel_hz, count)[hot]
-        self._thresholds = thresholds.astype(np.float32)
         self._leak_per_us = (1e-6 * leak_hz * sensor.threshold_on_log).astype(np.float32)
-        keys = np.random.SeedSequence([sensor.seed, *noise_key]).generate_state(2, np.uint64)
-        self._key, self._phase_seed = np.uint64(keys[0]), int(keys[1])
 
     def _settle(self, picture: NDArray[np.float32]) -> None:
         circuit = self._circuit
         self._state[0] = np.log(circuit.fa_per_lux * picture + circuit.dark_fa)
-        # Every pixel is somewhere between its thresholds when the recording begins.
-        place = np.random.default_rng(self._phase_seed).random(len(picture), dtype=np.float32)
-        on, off = self._thresholds
-        self._state[2] = self._state[0] - on + place * (on + off)
+        self._state[2] = self._memories(self._state[0], np.random.default_rng(self._phase_seed))
 
     def _run(self, picture: NDArray[np.float32], state: NDArray[np.float32], room: Array) -> int:
         return advance(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, Self
@@ -16,10 +17,13 @@ from eqs.scenes.circuit import Array, read_out
 
 
 @dataclass(frozen=True, kw_only=True)
-class EventSensor:
+class EventSensor(ABC):
     """An event camera that is fed with light, never with frames: its parameters, nothing else.
 
     Args:
+        threshold_on_log: mean ON threshold, natural-log contrast.
+        threshold_off_log: mean OFF threshold, natural-log contrast, positive.
+        threshold_mismatch_log: standard deviation of a pixel's threshold over the array.
         step_us: time between two renderings of the scene, us.
         seed: draws the fixed pattern of mismatch; one seed is one sensor.
     """
@@ -27,6 +31,9 @@ class EventSensor:
     scales: ClassVar[Mapping[str, Mapping[str, float]]] = {}
     """What one can have more or less of: by its name, parameters and the powers they go with."""
 
+    threshold_on_log: float
+    threshold_off_log: float
+    threshold_mismatch_log: float
     step_us: int = 1000
     seed: int = 0
 
@@ -49,11 +56,11 @@ class EventSensor:
         text = json.dumps(asdict(self), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
+    @abstractmethod
     def start(
         self, height: int, width: int, *, noise_key: tuple[int, ...], start_us: int = 0
     ) -> SensorStream:
         """Switch the sensor on; `noise_key` names the recording and thereby its noise."""
-        raise NotImplementedError
 
     def require(self, *positive: str) -> None:
         """Refuse values that no circuit has.
@@ -72,35 +79,44 @@ class EventSensor:
                 raise ValueError(f"Expected {name} > 0, got 0; set scene.sensor.{name}")
 
 
-class SensorStream:
+class SensorStream(ABC):
     """One recording: the state of every pixel and of the readout.
 
     Convention: picture k of a recording is the light at `start_us + k step_us`. Feeding the
     pictures one by one or in any groups gives the same events.
 
     Args:
+        sensor: the camera.
         height: rows of the sensor.
         width: columns of the sensor.
         rows: numbers that a pixel remembers from step to step.
-        step_us: time between two pictures, us.
         row_service_us: time the readout spends on one row, us.
+        noise_key: names the recording and thereby its noise.
         start_us: time of the first picture, us.
     """
 
     def __init__(
         self,
+        sensor: EventSensor,
         height: int,
         width: int,
         *,
         rows: int,
-        step_us: int,
         row_service_us: float,
+        noise_key: tuple[int, ...],
         start_us: int,
     ) -> None:
-        """The first picture settles the pixels."""
+        """Draw the thresholds, the first part of the fixed pattern; a picture settles the rest."""
         self._height, self._width, self._start_us = height, width, start_us
-        self._step_us, self._row_service_us = step_us, row_service_us
+        self._step_us, self._row_service_us = sensor.step_us, row_service_us
         count = height * width
+        self._pattern = np.random.default_rng(np.random.SeedSequence([sensor.seed, height, width]))
+        spread = sensor.threshold_mismatch_log * self._pattern.standard_normal((2, count))
+        floor = 0.2 * min(sensor.threshold_on_log, sensor.threshold_off_log)
+        means = np.array([[sensor.threshold_on_log], [sensor.threshold_off_log]])
+        self._thresholds = np.maximum(means + spread, floor).astype(np.float32)
+        keys = np.random.SeedSequence([sensor.seed, *noise_key]).generate_state(2, np.uint64)
+        self._key, self._phase_seed = np.uint64(keys[0]), int(keys[1])
         self._state = np.zeros((rows, count), np.float32)
         # Buffers that a step reuses: the state to be, and room for the step's events.
         self._trial, self._room = self._state.copy(), np.empty((count, 4))
@@ -135,13 +151,22 @@ class SensorStream:
         """The events still waiting for the readout."""
         return self._deliver(np.inf)
 
+    @abstractmethod
     def _settle(self, picture: NDArray[np.float32]) -> None:
         """Put every pixel into the state that the first picture leaves it in."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _run(self, picture: NDArray[np.float32], state: NDArray[np.float32], room: Array) -> int:
         """Advance `state` by one step and write (time us, x, y, p) rows; how many there are."""
-        raise NotImplementedError
+
+    def _memories(
+        self, output: NDArray[np.float32], random: np.random.Generator
+    ) -> NDArray[np.float32]:
+        """What pixels memorised before a recording began: each is between its thresholds."""
+        on, off = self._thresholds
+        place = random.random(len(output), dtype=np.float32)
+        memories: NDArray[np.float32] = output - on + place * (on + off)
+        return memories
 
     def _advance(self, picture: NDArray[np.float32]) -> Array:
         while True:
