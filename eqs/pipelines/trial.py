@@ -29,7 +29,8 @@ from eqs.metrics.silence import Silence
 from eqs.pipelines.command import explained
 from eqs.processors import side_by_side
 from eqs.trial import Challengers, Level, Means
-from eqs.trial.challengers import of_counts
+from eqs.trial.challengers import HEADLINE, RESET, of_counts
+from eqs.trial.means import Moments, load_means, save_means
 from eqs.trial.recorded import RealTrial, RenderedTrial
 from eqs.trial.tables import DEVELOPMENT, Found, write_tables
 
@@ -63,7 +64,8 @@ def trial(cfg: DictConfig) -> None:
             Job(plain, "real", str(cfg.real), n, all_means) for n in real_names(Path(cfg.real))
         ]
     found: list[Found] = []
-    done = side_by_side(run_job, jobs, cfg.workers)
+    workers = min(cfg.workers, len(jobs))
+    done = map(run_job, jobs) if workers <= 1 else side_by_side(run_job, jobs, workers)
     for each in track(done, description="trial", total=len(jobs)):
         found += each
     write_tables(found, [*cfg.simulators], out, Console())
@@ -104,17 +106,23 @@ def _path(cfg: DictConfig, job: Job, name: str, judge: Judge) -> Path:
     key = short_hash(
         [VERSION, judge.weights_sha256, job.half, job.scene, cfg.seed, cfg.size, cfg.windows,
          dict(sensors).get(job.sensor, job.sensor), job.cfg["halves"].get(job.half),  # type: ignore[arg-type]
-         job.cfg["worlds"].get(job.scene), job.cfg["simulators"]]
+         job.cfg["worlds"].get(job.scene), seed_number(job), job.cfg["simulators"]]
     )  # fmt: skip
     label = Path(name).name
     sensor = Path(job.sensor).name
     return Path(cfg.out) / "recordings" / f"{job.half}-{sensor}-{job.scene}-{label}-{key}.npz"
 
 
+def seed_number(job: Job) -> int:
+    """The number of a scene among the kinds of scenes, from which its seeds are made; 0 if real."""
+    names = sorted(job.cfg["worlds"])
+    return names.index(job.scene) if job.scene in names else 0
+
+
 def rendered_trial(cfg: DictConfig, job: Job) -> RenderedTrial:
     """The recording of a half, a sensor and a scene."""
     width, height = (int(each) for each in cfg.size.split("x"))
-    seed, number = int(cfg.halves[job.half].seed), sorted(cfg.worlds).index(job.scene)
+    seed, number = int(cfg.halves[job.half].seed), seed_number(job)
     world = instantiate(cfg.worlds[job.scene])
     return RenderedTrial(
         scene=world(height=height, width=width, seed=(seed, number, 0)),
@@ -214,7 +222,7 @@ def challenge(
             tally.add(pooled[definition.maps], quiet[definition.maps], done)
             done += len(chunk)
         scores = tally.scores()
-        kept = scores if not suffix else {KEPT_WHEN_RESET: scores[KEPT_WHEN_RESET]}
+        kept = scores if not suffix else {HEADLINE: scores[HEADLINE]}
         found |= {f"{name}{suffix}": values.numpy() for name, values in kept.items()}
         if not suffix:
             found |= {f"channels_{k}": each.numpy() for k, each in enumerate(tally.channels)}
@@ -224,10 +232,6 @@ def challenge(
             counted.setdefault(name, []).append(values)
     found |= {name: torch.cat(parts)[skip:].mean(dim=0).numpy() for name, parts in counted.items()}
     return found
-
-
-KEPT_WHEN_RESET: Final = "agreement, silence, cells"
-RESET: Final = ", state reset"
 
 
 def _joined(parts: Sequence[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
@@ -250,41 +254,16 @@ def means_of(cfg: DictConfig, name: str, out: Path) -> Path:
         for scene in cfg.scenes
         for sensor in half.sensors
     ]
-    sums: list[list[torch.Tensor]] = []
+    moments = Moments()
     for job in track(jobs, description=f"mean features of {Path(name).name}"):
         made = rendered_trial(cfg, job)
         starts = np.arange(0, made.stop_us, WINDOW_US)
         chunks = list(histogram_chunks([made.reference()], starts, DEFINITION, 8))
-        quiet = Silence(judge.backbone)
-        size, done = tuple(chunks[0].shape[-2:]), 0
+        quiet, size, done = Silence(judge.backbone), chunks[0].shape[-2:], 0
         for pooled in pooled_features(judge.backbone, chunks, definitions=[DEFINITION]):
             stages = pooled[DEFINITION.maps]
-            silent = quiet.responses([DEFINITION], size, done, len(stages[0]))[DEFINITION.maps]  # type: ignore[arg-type]
-            sums.append([_moments(a, b) for a, b in zip(stages, silent, strict=True)])
+            silent = quiet.responses([DEFINITION], (size[0], size[1]), done, len(stages[0]))
+            moments.add(stages, silent[DEFINITION.maps])
             done += len(stages[0])
-    totals = [torch.stack(each).sum(dim=0) for each in zip(*sums, strict=True)]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with complete_file(path) as partial, partial.open("wb") as file:
-        np.savez(file, *(each.numpy() for each in totals))
+    save_means(path, moments.means())
     return path
-
-
-def _moments(stage: torch.Tensor, silent: torch.Tensor) -> torch.Tensor:
-    """Count, sum of features, and products of features from silence, packed in one matrix."""
-    flat = stage.double().movedim(2, -1).flatten(0, -2)
-    away = (stage - silent).double().movedim(2, -1).flatten(0, -2)
-    packed = torch.zeros(flat.shape[1] + 2, flat.shape[1], dtype=torch.float64)
-    packed[0, 0], packed[1], packed[2:] = len(flat), flat.sum(dim=0), away.T @ away
-    return packed
-
-
-def load_means(path: Path) -> list[Means]:
-    """What `means_of` wrote, by stage."""
-    found = []
-    with np.load(path) as data:
-        for k in range(len(data)):
-            packed = torch.from_numpy(data[f"arr_{k}"])
-            count = packed[0, 0]
-            centre, covariance = (packed[1] / count).float(), (packed[2:] / count).float()
-            found.append(Means(centre=centre, covariance=covariance))
-    return found

@@ -13,6 +13,8 @@ from torch.nn import functional
 from eqs.metrics.pooling import pool_patches
 from eqs.metrics.similarity import patch_agreement, patch_cosine, whitening_matrix
 
+HEADLINE: Final = "agreement, silence, cells"  # what `EventQualityScore` computes
+RESET: Final = ", state reset"  # ends the name where every window starts anew
 SMALL: Final = 1e-4  # in the ratios of local structure and texture
 
 
@@ -98,7 +100,7 @@ def compared(stage: Tensor, silence: Tensor, means: Means) -> Mapping[str, Tenso
         "cosine, silence, cells": cosine(from_silence),
         "cosine, silence, active cells": masked(cosine_map(from_silence), active),
         "agreement, silence, 3x3": agreement(pooled),
-        "agreement, silence, cells": agreed,
+        HEADLINE: agreed,
         "its distance form": 1 - (1 - agreed).clamp_min(0).sqrt(),
         "agreement, silence, whitened": agreement(white),
         "agreement, loud and quiet half": loud_and_quiet(from_silence),

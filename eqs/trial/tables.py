@@ -15,17 +15,16 @@ from rich.console import Console
 
 from eqs.files import write_text
 from eqs.trial.chains import CEILING
+from eqs.trial.challengers import HEADLINE, RESET
 from eqs.trial.order import floor_share, rank_agreement, shares_in_order, way_lost
 from eqs.trial.recorded import BLANK, CHANCE, SIMULATOR
 from eqs.trial.weights import learned, weighted
 
 LEARNED: Final = "agreement, learned weights"
 PRODUCTS: Final = {
-    "agreement carried x reset": (
-        "agreement, silence, cells", "agreement, silence, cells, state reset",
-    ),
-    "agreement x counts": ("agreement, silence, cells", "counts, 10 ms, 1 px: agreement"),
-}  # fmt: skip
+    "agreement carried x reset": (HEADLINE, HEADLINE + RESET),
+    "agreement x counts": (HEADLINE, "counts, 10 ms, 1 px: agreement"),
+}
 # Streams whose cost is required, by what they are called: kind, step and least cost.
 COSTS: Final = {
     "strobe 20 Hz": ("strobe", 3, 0.30),
@@ -98,30 +97,34 @@ def with_composed(found: Sequence[Found]) -> list[Found]:
     Convention: weights are learned on the development half, for a recording of that half on those
     of other cameras.
     """
+    weights = learned_weights(found)
     complete = []
     for each in found:
-        others = [
-            other for other in found
-            if other.half == DEVELOPMENT and other.judge == each.judge
-            and (each.half != DEVELOPMENT or other.sensor != each.sensor)
-        ]  # fmt: skip
         scores = dict(each.scores)
-        if others:
-            weights = _weights(tuple(id(other) for other in others), others)
-            scores[LEARNED] = weighted(each.channels, weights).numpy()
+        if (key := _lesson(each)) in weights:
+            scores[LEARNED] = weighted(each.channels, weights[key]).numpy()
         for name, (one, other) in PRODUCTS.items():
             scores[name] = np.clip(scores[one], 0, None) * np.clip(scores[other], 0, None)
         complete.append(replace(each, scores=scores))
     return complete
 
 
-_LEARNED: dict[tuple[int, ...], list[torch.Tensor]] = {}
+def learned_weights(found: Sequence[Found]) -> dict[tuple[str, str], list[torch.Tensor]]:
+    """Weights of channels by judge and by the camera that they were not learned on."""
+    weights = {}
+    for judge, left_out in {_lesson(each): None for each in found}:
+        others = [
+            each for each in found
+            if each.half == DEVELOPMENT and each.judge == judge and each.sensor != left_out
+        ]  # fmt: skip
+        if others:
+            weights[judge, left_out] = learned([(each.channels, each.chains()) for each in others])
+    return weights
 
 
-def _weights(key: tuple[int, ...], others: Sequence[Found]) -> list[torch.Tensor]:
-    if key not in _LEARNED:
-        _LEARNED[key] = learned([(each.channels, each.chains()) for each in others])
-    return _LEARNED[key]
+def _lesson(found: Found) -> tuple[str, str]:
+    """The judge, and the camera that must not have taught; none outside the development half."""
+    return found.judge, found.sensor if found.half == DEVELOPMENT else ""
 
 
 def summary(found: Sequence[Found]) -> pd.DataFrame:
@@ -149,8 +152,8 @@ def _row(found: Sequence[Found], name: str) -> dict[str, float]:
         ends.append((ceiling, chance, blank, float(blank <= chance + 0.02)))
         costs.append(
             {
-                shown: way_lost(scores[kind, step], ceiling, chance)
-                for shown, (kind, step, _) in COSTS.items()
+                f"{shown} (>= {least:.2f})": way_lost(scores[kind, step], ceiling, chance)
+                for shown, (kind, step, least) in COSTS.items()
                 if (kind, step) in scores
             }
         )
@@ -179,7 +182,8 @@ def _agreement(found: Sequence[Found], name: str) -> float:
             if each.sensor == sensor
         ]
         means.append(rank_agreement(orders))
-    return float(np.nanmean(means))
+    known = [each for each in means if not np.isnan(each)]
+    return float(np.mean(known)) if known else float("nan")
 
 
 def simulator_table(found: Sequence[Found], simulators: Sequence[str], name: str) -> pd.DataFrame:
@@ -208,8 +212,7 @@ def write_tables(
     table = summary(complete)
     out.mkdir(parents=True, exist_ok=True)
     table.to_csv(out / "trial.csv", index=False, float_format="%.4f")
-    headline = "agreement, silence, cells"
-    simulator_table(complete, simulators, headline).to_csv(
+    simulator_table(complete, simulators, HEADLINE).to_csv(
         out / "simulators.csv", index=False, float_format="%.4f"
     )
     text = "\n\n".join(_sections(table))

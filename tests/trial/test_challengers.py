@@ -5,9 +5,12 @@ from __future__ import annotations
 import pytest
 import torch
 
-from eqs.metrics import patch_cosine, pool_patches
+from eqs.metrics import Definition, EventQualityScore, Judge, patch_cosine, pool_patches
+from eqs.metrics.definition import VERSION_1
+from eqs.metrics.features import pooled_features
+from eqs.metrics.silence import Silence
 from eqs.trial import Challengers, Means
-from eqs.trial.challengers import compared, of_counts
+from eqs.trial.challengers import HEADLINE, compared, of_counts
 
 CHANNELS = 6
 
@@ -80,3 +83,24 @@ def test_counts_see_place_polarity_and_time() -> None:
         same, *others = values.mean(dim=0).tolist()
         assert same == pytest.approx(1.0, abs=1e-6), name
         assert max(others) < 0.9, name
+
+
+def test_two_of_them_are_the_scores_of_the_metric() -> None:
+    """The headline, and the one before it with its centre, digit for digit as a user gets them."""
+    torch.manual_seed(2)
+    real, simulated = torch.poisson(torch.full((2, 12, 20, 48, 64), 0.05)).to(torch.uint8)
+    judge = Judge.random(size="tiny", partition_split_32=1).centred_on([real])
+    streams = torch.stack([real, simulated], dim=1)
+    definition = Definition(patch_size=1)
+    (pooled,) = pooled_features(judge.backbone, [streams], definitions=[definition])
+    quiet = Silence(judge.backbone).responses([definition], (48, 64), 0, 12)[definition.maps]
+    means = [
+        Means(centre=each, covariance=torch.eye(len(each)))
+        for each in judge.centres[0].for_stages((1, 2, 3))
+    ]
+    tally = Challengers(means, skip=definition.warmup_of(12))
+    tally.add(pooled[definition.maps], quiet, 0)
+    for name, chosen in ((HEADLINE, {}), ("version 1: cosine, mean real, 3x3", VERSION_1)):
+        metric = EventQualityScore(judge, **chosen)
+        metric.update(simulated, real)
+        assert tally.scores()[name].item() == pytest.approx(metric.last.score, abs=1e-6), name
