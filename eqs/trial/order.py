@@ -45,8 +45,8 @@ def way_lost(score: float, ceiling: float, chance: float) -> float:
     """How much of the way from ceiling to chance a stream has gone; NaN where there is none.
 
     Example:
-        >>> way_lost(0.7, ceiling=0.9, chance=0.1)
-        0.25
+        >>> way_lost(0.75, ceiling=1.0, chance=0.5)
+        0.5
     """
     return (ceiling - score) / (ceiling - chance) if ceiling > chance else float("nan")
 
