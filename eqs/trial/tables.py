@@ -167,7 +167,7 @@ def _row(found: Sequence[Found], name: str) -> dict[str, float]:
         "blank": middle[2],
         "blank_below_chance": middle[3],
         "rank_agreement": _agreement(found, name),
-        **{f"cost: {shown}": value for shown, value in pd.DataFrame(costs).mean().items()},
+        **{f"cost: {shown}": value for shown, value in pd.DataFrame(costs).median().items()},
         **{f"order: {kind}": value for kind, value in kinds.items()},
     }
 
