@@ -15,8 +15,8 @@ from eqs.metrics.windows import chunk_length
 class Silence:
     """A judge's response to silence, window by window; it depends on nothing but the judge.
 
-    Convention: from the last window of the warm-up on, by when the state has settled, it is that
-    of this window. So a long recording costs no longer a silence.
+    Convention: from the last window of the warm-up on it is that of this window, so that a long
+    recording costs no longer a silence. A judge that drifts on gives a blank stream more than 0.
 
     Args:
         backbone: the judge's network.
@@ -76,7 +76,3 @@ class Silence:
             each: [torch.cat(stages) for stages in zip(*(p[each] for p in parts), strict=True)]
             for each in maps
         }
-
-
-def _unmasked(definition: Definition) -> Definition:
-    return replace(definition, mask="none")
