@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.connection import wait
 from typing import TypeVar
 
 Job = TypeVar("Job")
@@ -17,6 +20,7 @@ _share = 1
 
 # Below this a part of an image is done before its thread has started.
 LEAST_PIXELS = 1 << 15
+PR_SET_PDEATHSIG = 1  # of Linux's prctl: the signal that a process gets when its parent ends
 
 
 def share_cores(processes: int) -> None:
@@ -43,7 +47,7 @@ def side_by_side(
     """Do jobs in processes of their own; the results come as they are ready.
 
     Who stops listening, by an exception or Ctrl-C, stops the work: processes clear away what they
-    have half written and end.
+    have half written and end. If this process is killed, they end with it.
 
     Args:
         work: a function of a module, given one job.
@@ -79,4 +83,25 @@ def _begin(workers: int) -> None:
     """Leave Ctrl-C to the process that asked, and end tidily when it says so."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    end_with_parent()
     share_cores(workers)
+
+
+def end_with_parent() -> None:
+    """Let this process end when the one that started it does, even if that one was killed.
+
+    Whoever types the command again then meets nobody who still writes. A thread watches on every
+    system; Linux also ends a process whose compiled code lets no thread run.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    # Begun after that, so that a parent that ended in between is noticed here.
+    threading.Thread(target=_watch, args=(parent.sentinel,), daemon=True).start()
+
+
+def _watch(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
