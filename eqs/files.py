@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import logging
@@ -22,6 +23,10 @@ log = logging.getLogger(__name__)
 PARTIAL = ".partial"
 MADE_HERE = "event-quality-score"  # what pictures and films made here say of themselves
 ABANDONED_S = 86_400  # nobody writes a day long without touching the file
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+# What HDF5 and PyTorch say where a disk is full.
+SAID_WHEN_FULL = ("No space left on device", "File too large", "Disk quota exceeded",
+                  "errno = 28", "file write failed")  # fmt: skip
 
 
 @contextmanager
@@ -34,6 +39,9 @@ def complete_file(path: Path | str) -> Iterator[Path]:
 
     Args:
         path: the file's name; its folder is made if need be.
+
+    Raises:
+        OSError: the disk is full; the error names the file.
 
     Example:
         >>> import tempfile
@@ -52,8 +60,19 @@ def complete_file(path: Path | str) -> Iterator[Path]:
         with partial.open("rb+") as file:
             os.fsync(file.fileno())
         partial.replace(path)
+    except (OSError, RuntimeError) as error:  # the latter are HDF5's and PyTorch's
+        if not is_full(error):
+            raise
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
     finally:
         partial.unlink(missing_ok=True)
+
+
+def is_full(error: BaseException) -> bool:
+    """Whether an error says that there is no room to write, whoever raised it."""
+    if isinstance(error, OSError) and error.errno in FULL:
+        return True
+    return any(said in str(error) for said in SAID_WHEN_FULL)
 
 
 @contextmanager

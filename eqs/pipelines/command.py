@@ -15,6 +15,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
 
 from eqs.extras import lacking
+from eqs.files import is_full
 from eqs.pipelines.keys import in_this_command
 from eqs.pipelines.sensors import check_sensor
 
@@ -80,6 +81,12 @@ def sentence(error: BaseException, cfg: DictConfig, where: str = "") -> str:
         return f"Expected a value for {error.full_key}, got none; set {error.full_key}=..."
     if isinstance(error, OmegaConfBaseException):
         return f"{str(error).splitlines()[0]} (config key {error.full_key})"
+    if is_full(error):
+        place = getattr(error, "filename", None) or "the folders below paths"
+        return (
+            f"Expected room to write {place}, got a full disk; make room, or set "
+            f"{path_keys(place, cfg)}"
+        )
     if isinstance(error, OSError) and error.errno is not None:
         reason = str(error.strerror).splitlines()[0]  # HDF5 tells the rest of its story below
         return (
