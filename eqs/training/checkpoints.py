@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -26,9 +27,14 @@ class CompleteCheckpoints(TorchCheckpointIO):
         path: Path | str,
         storage_options: Any | None = None,  # noqa: ANN401 - the trainer's
     ) -> None:
-        """Write one checkpoint."""
+        """Write one checkpoint; the one before stays until the new one reads back.
+
+        Raises:
+            OSError: the disk is full, or does not give back what was written.
+        """
         with complete_file(path) as partial:
             torch.save(checkpoint, partial)
+            require_readable(partial, Path(path))
 
 
 class Identity(Callback):
@@ -47,6 +53,28 @@ class Identity(Callback):
     ) -> None:
         """Add the identity before the checkpoint is written."""
         checkpoint[IDENTITY] = self.identity
+
+
+def require_readable(written: Path, path: Path) -> None:
+    """Refuse a checkpoint whose bytes are not those that were written, by their check sums.
+
+    Args:
+        written: the file, still under its temporary name.
+        path: the name that it is to have.
+
+    Raises:
+        OSError: it does not read back.
+    """
+    try:
+        with zipfile.ZipFile(written) as archive:
+            damaged = archive.testzip()
+    except zipfile.BadZipFile as error:
+        damaged = str(error)
+    if damaged is not None:
+        raise OSError(
+            f"Expected the checkpoint for {path} to read back as written, got damage in {damaged}; "
+            "check the disk, or set paths.runs to another"
+        )
 
 
 def require_finite(weights: Mapping[str, Tensor], step: int) -> None:
