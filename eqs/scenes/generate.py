@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from eqs.files import one_at_a_time, read_json, write_json
+from eqs.files import PARTIAL, one_at_a_time, read_json, write_json
 from eqs.processors import available_cores, side_by_side
 from eqs.scenes.camera import FrameCamera
 from eqs.scenes.labels import LabelRule
@@ -93,9 +93,13 @@ class DSECMini:
 
         Returns:
             `root`.
+
+        Raises:
+            ValueError: the folder holds files, none of which were written here.
         """
         root = Path(root)
         if not self._is_complete(root):
+            refuse_foreign(root)
             with one_at_a_time(root, f"generating {root}"):
                 if not self._is_complete(root):
                     self._generate(root)
@@ -150,10 +154,15 @@ class DSECMini:
         manifest = root / "manifest.json"
         if not manifest.is_file():
             return False
-        return bool(read_json(manifest).get("parameters") == self._description())
+        if read_json(manifest).get("parameters") != self._description():
+            return False
+        # What was deleted since is made again.
+        return all(each.kept(root, each.files) is not None for each in self.recordings())
 
     def _generate(self, root: Path) -> None:
         (root / "manifest.json").unlink(missing_ok=True)  # it speaks of what may now change
+        for left in root.glob(f"*/mini_*{PARTIAL}"):  # by a process that was killed
+            shutil.rmtree(left, ignore_errors=True)
         records = sorted(self._records(root), key=lambda record: str(record["name"]))
         self._remove_others(root)
         for record in records:
@@ -206,6 +215,24 @@ class DSECMini:
         with Progress(*columns) as progress:
             description = f"dsec_mini {self.size}"
             return list(progress.track(done, total=len(jobs), description=description))
+
+
+def refuse_foreign(root: Path) -> None:
+    """Let nobody find a generated data set among files of their own.
+
+    Raises:
+        ValueError: the folder holds files, none of which were written here.
+    """
+    ours = ("manifest.json", f"*/mini_*/{RECORD}", f"*/mini_*{PARTIAL}")
+    if any(next(root.glob(pattern), None) for pattern in ours):
+        return
+    found = next((path for path in root.rglob("*") if path.is_file()), None)
+    if found is not None:
+        raise ValueError(
+            f"Expected an empty or a new folder to generate a data set in, got {root} with "
+            f"{found.relative_to(root)}; set data=dsec or data=own to read what lies there, or "
+            "data.root to another folder"
+        )
 
 
 def _write(job: tuple[SequencePlan, Path]) -> dict[str, Any]:

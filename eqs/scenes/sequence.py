@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,9 @@ LEAD_OUT_US: Final = 10_000  # and after the last one
 SPLITS: Final = {"train": 0, "val": 1, "test": 2}
 RECORD: Final = "sequence.json"
 EVENTS: Final = Path("events/left/events.h5")
+TRACKS: Final = Path("object_detections/left/tracks.npy")
+TIMES: Final = Path("images/timestamps.txt")
+EXPOSURES: Final = Path("images/left/exposure_timestamps.txt")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +140,7 @@ class SequencePlan:
         Raises:
             ValueError: a folder of that name is there, which was not written here.
         """
-        return self._once(root / self.split / self.name, self._render)
+        return self._once(root / self.split / self.name, self._render, self.files)
 
     def write_events(self, root: Path) -> dict[str, Any]:
         """Write what the event camera alone leaves, into the same folder below another root.
@@ -144,12 +148,24 @@ class SequencePlan:
         Raises:
             ValueError: as `write` says.
         """
-        return self._once(root / self.split / self.name, self._watch)
+        return self._once(root / self.split / self.name, self._watch, (EVENTS,))
 
-    def kept(self, root: Path) -> dict[str, Any] | None:
-        """The record of what lies below `root`, if it was written with this very description."""
-        path = root / self.split / self.name / RECORD
-        if not (path.is_file() and self.events_file(root).is_file()):
+    @property
+    def files(self) -> Sequence[Path]:
+        """What a whole recording consists of, below its folder, its record left out."""
+        frames = (Path(f"images/left/distorted/{k:06d}.png") for k in range(self.frames))
+        return (EVENTS, TRACKS, TIMES, EXPOSURES, *frames)
+
+    def kept(self, root: Path, files: Sequence[Path] = (EVENTS,)) -> dict[str, Any] | None:
+        """The record of what lies below `root`, if it was written with this very description.
+
+        Args:
+            root: where the recording lies.
+            files: what must be there beside the record; links must lead somewhere.
+        """
+        folder = root / self.split / self.name
+        path = folder / RECORD
+        if not (path.is_file() and all((folder / each).is_file() for each in files)):
             return None
         record = read_json(path)
         return record if record["description"] == self.description() else None
@@ -158,23 +174,33 @@ class SequencePlan:
         """Where the events lie below a root."""
         return root / self.split / self.name / EVENTS
 
-    def _once(self, folder: Path, make: Callable[[Path], dict[str, Any]]) -> dict[str, Any]:
-        record = self.kept(folder.parents[1])
+    def _once(
+        self, folder: Path, make: Callable[[Path], dict[str, Any]], files: Sequence[Path]
+    ) -> dict[str, Any]:
+        record = self.kept(folder.parents[1], files)
         if record is not None:
             return record
+        if folder.is_symlink() and not folder.exists():
+            raise ValueError(
+                f"Expected a recording at {folder}, got a link to {folder.readlink()}, where "
+                "nothing is; bring that back, or remove the link"
+            )
         if folder.exists() and not (folder / RECORD).is_file():
             raise ValueError(
                 f"Expected no folder at {folder} but those written here, got another; set "
                 "data.root to a new folder"
             )
-        partial = folder.with_name(folder.name + PARTIAL)
-        for old in (partial, folder):
-            if old.exists():
-                shutil.rmtree(old)
+        # A name of its own, so that no two processes ever write into the same folder.
+        partial = folder.with_name(f"{folder.name}.{uuid4().hex}{PARTIAL}")
         partial.mkdir(parents=True)
-        record = make(partial)
-        write_json(partial / RECORD, record)
-        partial.replace(folder)
+        try:
+            record = make(partial)
+            write_json(partial / RECORD, record)
+            if folder.exists():
+                shutil.rmtree(folder)
+            partial.replace(folder)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
         return record
 
     def _watch(self, folder: Path) -> dict[str, Any]:
@@ -191,9 +217,9 @@ class SequencePlan:
         world, times, duration_us = self.world(), self.frame_times_us, self.duration_us
         exposure_us = self._write_frames(folder, world, times)
         boxes = [self.rule.boxes(world.view(int(t)), int(t) + self.t_offset_us) for t in times]
-        (folder / "object_detections/left").mkdir(parents=True)
+        (folder / TRACKS).parent.mkdir(parents=True)
         tracks = np.concatenate(boxes)
-        np.save(folder / "object_detections/left/tracks.npy", tracks)
+        np.save(folder / TRACKS, tracks)
         events, on = self._write_events(folder, world, duration_us)
         classes, counts = np.unique(tracks["class_id"], return_counts=True)
         return {
@@ -218,11 +244,9 @@ class SequencePlan:
         stamps = times + self.t_offset_us
         half = exposure.time_us // 2
         lines = "".join(f"{t}\n" for t in stamps)
-        (folder / "images/timestamps.txt").write_text(lines)
+        (folder / TIMES).write_text(lines)
         spans = "".join(f"{t - half}, {t + half}\n" for t in stamps)
-        (folder / "images/left/exposure_timestamps.txt").write_text(
-            "# exposure start, exposure end\n" + spans
-        )
+        (folder / EXPOSURES).write_text("# exposure start, exposure end\n" + spans)
         return exposure.time_us
 
     def _write_events(self, folder: Path, world: DrivingWorld, duration_us: int) -> tuple[int, int]:
