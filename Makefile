@@ -9,7 +9,7 @@ VENV := .venv
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install study test lint format
+.PHONY: help install study test faults lint format
 
 help: ## List the targets
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
@@ -33,6 +33,9 @@ study: install ## Run the whole study on dsec_mini: generate, simulate, train, s
 
 test: install ## Run the tests
 	$(VENV)/bin/python -m pytest
+
+faults: install ## Kill commands, start them twice and fill the disk, many times over: hours
+	EQS_FAULT_KILLS=18 EQS_FAULT_PAIRS=20 $(VENV)/bin/python -m pytest tests/faults
 
 lint: install ## Check style, types and formatting
 	$(VENV)/bin/ruff check .

@@ -25,8 +25,10 @@ MADE_HERE = "event-quality-score"  # what pictures and films made here say of th
 ABANDONED_S = 86_400  # nobody writes a day long without touching the file
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # What HDF5 and PyTorch say where a disk is full.
-SAID_WHEN_FULL = ("No space left on device", "File too large", "Disk quota exceeded",
-                  "errno = 28", "file write failed")  # fmt: skip
+SAID_WHEN_FULL = (
+    "No space left on device", "File too large", "Disk quota exceeded", "errno = 28",
+    "file write failed", "unexpected pos", "PytorchStreamWriter failed writing",
+)  # fmt: skip
 
 
 @contextmanager

@@ -182,3 +182,36 @@ def test_unknown_splits_are_refused():
 def test_one_frame_is_not_a_recording():
     with pytest.raises(ValueError, match="at least 2 frames, got 1"):
         replace(TINY, frames=1)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "object_detections/left/tracks.npy",
+        "images/timestamps.txt",
+        "images/left/distorted/000002.png",
+        "events/left/events.h5",
+    ],
+)
+def test_a_deleted_file_is_noticed_and_made_again(root, tmp_path, name):
+    TINY.generate(tmp_path)
+    next(tmp_path.glob("train/mini_train_000*")).joinpath(name).unlink()
+    TINY.generate(tmp_path)
+    assert same_data(root, tmp_path)
+
+
+def test_files_of_others_are_left_alone(tmp_path):
+    (tmp_path / "train").mkdir()
+    (tmp_path / "train/zurich.txt").write_text("mine")
+    with pytest.raises(ValueError, match=r"train/zurich\.txt; set data=dsec"):
+        TINY.generate(tmp_path)
+    assert [path.name for path in tmp_path.rglob("*")] == ["train", "zurich.txt"]
+
+
+def test_a_link_to_nothing_is_named(root, tmp_path):
+    TINY.generate(tmp_path)
+    folder = next(tmp_path.glob("test/mini_*"))
+    folder.rename(tmp_path / "moved")
+    folder.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(ValueError, match=r"link to .*elsewhere"):
+        TINY.generate(tmp_path)
