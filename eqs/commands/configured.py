@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from eqs.commands.quoting import is_path, with_quoted_path
 from eqs.extras import needed
 
 if TYPE_CHECKING:
@@ -45,7 +46,8 @@ def with_files(arguments: Sequence[str]) -> list[str]:
     names = iter(("simulated", "real"))
     translated = []
     for before, argument in zip(("", *arguments), arguments, strict=False):
-        plain = "=" not in argument and not argument.startswith("-") and before not in WITH_VALUE
+        named = "=" not in argument or is_path(argument)  # names of files may have an = in them
+        plain = named and not argument.startswith("-") and before not in WITH_VALUE
         name = next(names, None) if plain else None
         translated.append(f"{name}={argument}" if name else argument)
     return translated
@@ -109,7 +111,7 @@ def run_configured(verb: str, arguments: Sequence[str]) -> None:
             sys.exit(str(error))
         return getattr(module, command.pipeline)(cfg)
 
-    given = command.translate(arguments)
+    given = [with_quoted_path(each) for each in command.translate(arguments)]
     sys.argv = [typed[0], *given]
     try:
         with keys_explained(given):

@@ -8,11 +8,14 @@ import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Final, TypeVar
+from zipfile import BadZipFile
 
 from hydra.errors import InstantiationException
 from omegaconf import DictConfig
 from omegaconf.errors import MissingMandatoryValue, OmegaConfBaseException
+from PIL.Image import DecompressionBombError
+from yaml import YAMLError
 
 from eqs.extras import lacking
 from eqs.files import is_full
@@ -21,6 +24,11 @@ from eqs.pipelines.sensors import check_sensor
 
 log = logging.getLogger(__name__)
 Result = TypeVar("Result")
+# Failures that files, settings and machines cause; any other is a mistake of ours.
+EXPECTED: Final = (
+    ValueError, OSError, EOFError, MemoryError, ImportError, BadZipFile, YAMLError,
+    DecompressionBombError, InstantiationException, OmegaConfBaseException,
+)  # fmt: skip
 
 
 class Interrupted(KeyboardInterrupt):
@@ -46,7 +54,7 @@ def explained(command: Callable[[DictConfig], Result]) -> Callable[[DictConfig],
             kept = str(stop) or "whatever is complete is kept"
             log.warning("interrupted: %s; type the same command again to go on", kept)
             raise SystemExit(130) from None
-        except (ValueError, OSError, InstantiationException, OmegaConfBaseException) as error:
+        except EXPECTED as error:
             if os.environ.get("HYDRA_FULL_ERROR"):
                 raise
             log.error("%s", sentence(error, cfg))
@@ -75,6 +83,8 @@ def sentence(error: BaseException, cfg: DictConfig, where: str = "") -> str:
         return f"{message} (config key {place})" if place else message
     if isinstance(error, ModuleNotFoundError):  # an optional package of Lightning's
         return lacking(error, "all", f"for {where}" if where else "for this")
+    if (said := of_machine(error)) is not None:
+        return said
     if isinstance(error, TypeError | AttributeError):  # of a constructor: a text for a number
         return f"Expected values of the configured kinds, got another: {error}; set them anew"
     if isinstance(error, MissingMandatoryValue):
@@ -94,6 +104,24 @@ def sentence(error: BaseException, cfg: DictConfig, where: str = "") -> str:
             f"set {path_keys(error.filename, cfg)}"
         )
     return in_this_command(str(error), cfg, where) or type(error).__name__
+
+
+def of_machine(error: BaseException) -> str | None:
+    """The sentence about memory, damaged files and packages; None for any other failure."""
+    said = str(error).splitlines()[0] if str(error) else ""
+    if isinstance(error, ImportError):
+        return f"Expected the packages of this command to load, got: {said}; install them anew"
+    if isinstance(error, MemoryError):
+        return (
+            f"Expected memory enough, got none left ({said or 'it does not say for what'}); "
+            "set fewer workers, jobs or windows at once"
+        )
+    if isinstance(error, EOFError | BadZipFile | YAMLError | DecompressionBombError):
+        return (
+            f"Expected files that are whole, got: {said or 'it ends too early'}; write or fetch "
+            "them anew"
+        )
+    return None
 
 
 def path_keys(filename: object, cfg: DictConfig) -> str:

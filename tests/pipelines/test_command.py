@@ -3,12 +3,15 @@
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from zipfile import BadZipFile
 
 import pytest
 from hydra import compose, initialize_config_dir
 from hydra.errors import ConfigCompositionException
 from hydra.utils import instantiate
 from omegaconf import DictConfig
+from PIL.Image import DecompressionBombError
+from yaml import YAMLError
 
 import eqs
 from eqs.pipelines.command import explained
@@ -82,6 +85,29 @@ def test_a_place_that_cannot_be_written_names_its_key(
     )
     assert message.startswith(f"Expected to read and write {tmp_path / 'file'}")
     assert message.endswith("set paths.runs")
+
+
+@pytest.mark.parametrize(
+    ("error", "wanted"),
+    [
+        (MemoryError(), "Expected memory enough, got none left (it does not say for what); set "),
+        (MemoryError("4 GiB for t"), "Expected memory enough, got none left (4 GiB for t); set "),
+        (EOFError(), "Expected files that are whole, got: it ends too early; write or fetch"),
+        (BadZipFile("File is not a zip file"), "Expected files that are whole, got: File is not"),
+        (YAMLError("a tab\nin line 3"), "Expected files that are whole, got: a tab; write"),
+        (DecompressionBombError("300000000 pixels"), "Expected files that are whole, got: 3000"),
+        (ImportError("libfoo.so.3"), "Expected the packages of this command to load, got: libfoo"),
+    ],
+)
+def test_what_files_and_machines_cause_is_one_sentence(
+    said: Callable[..., str], error: Exception, wanted: str
+) -> None:
+    def failing(cfg: DictConfig) -> None:
+        raise error
+
+    message = said(failing)
+    assert message.startswith(wanted)
+    assert "\n" not in message
 
 
 def test_a_mistake_of_ours_keeps_its_traceback() -> None:
