@@ -24,11 +24,12 @@ PARTIAL = ".partial"
 MADE_HERE = "event-quality-score"  # what pictures and films made here say of themselves
 ABANDONED_S = 86_400  # nobody writes a day long without touching the file
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# What HDF5 and PyTorch say where a disk is full.
+# What HDF5 and PyTorch say where a disk is full; PyTorch sees only that a write was cut short.
 SAID_WHEN_FULL = (
-    "No space left on device", "File too large", "Disk quota exceeded", "errno = 28",
-    "file write failed", "unexpected pos", "PytorchStreamWriter failed writing",
+    "No space left on device", "File too large", "Disk quota exceeded",
+    "unexpected pos", "PytorchStreamWriter failed writing",
 )  # fmt: skip
+WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 @contextmanager
@@ -58,23 +59,32 @@ def complete_file(path: Path | str) -> Iterator[Path]:
     _remove_abandoned(path)
     partial = path.with_name(f"{path.name}.{uuid4().hex}{PARTIAL}")
     try:
-        yield partial
-        with partial.open("rb+") as file:
-            os.fsync(file.fileno())
+        with _named_when_full(path):
+            yield partial
+            with partial.open("rb+") as file:
+                os.fsync(file.fileno())
         partial.replace(path)
-    except (OSError, RuntimeError) as error:  # the latter are HDF5's and PyTorch's
-        if not is_full(error):
-            raise
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
     finally:
         partial.unlink(missing_ok=True)
 
 
 def is_full(error: BaseException) -> bool:
-    """Whether an error says that there is no room to write, whoever raised it."""
+    """Whether an error says that there is no room to write; HDF5 and PyTorch say it in words."""
     if isinstance(error, OSError) and error.errno in FULL:
         return True
-    return any(said in str(error) for said in SAID_WHEN_FULL)
+    in_words = isinstance(error, OSError | RuntimeError)
+    return in_words and any(said in str(error) for said in SAID_WHEN_FULL)
+
+
+@contextmanager
+def _named_when_full(path: Path) -> Iterator[None]:
+    """Name what a full disk keeps from being written, which libraries do not."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        if not is_full(error):
+            raise
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
 
 
 @contextmanager
@@ -88,6 +98,7 @@ def complete_folder(path: Path | str) -> Iterator[Path]:
 
     Raises:
         ValueError: there is something of that name.
+        OSError: the disk is full; the error names the folder.
 
     Example:
         >>> import tempfile
@@ -103,7 +114,8 @@ def complete_folder(path: Path | str) -> Iterator[Path]:
     partial = path.with_name(f"{path.name}.{uuid4().hex}{PARTIAL}")
     partial.mkdir(parents=True)
     try:
-        yield partial
+        with _named_when_full(path):
+            yield partial
         partial.rename(path)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
@@ -124,16 +136,25 @@ def glob_escaped(name: str) -> str:
     return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
 
 
+def remove_unfinished(folder: Path, pattern: str) -> None:
+    """Remove the partial folders that killed writers left; only for who works here alone."""
+    for left in folder.glob(f"{pattern}{PARTIAL}"):
+        shutil.rmtree(left, ignore_errors=True)
+
+
 @contextmanager
-def one_at_a_time(path: Path | str, work: str) -> Iterator[None]:
+def one_at_a_time(path: Path | str, work: str) -> Iterator[bool]:
     """Let one process at a time do some work; the others wait and then find it done.
 
-    Where the file system has no locks all of them work; the files they write are whole all the
-    same.
+    Where the file system has no locks all of them work, after a warning; the files they write are
+    whole all the same. The block is told whether it works alone.
 
     Args:
         path: what is worked on; the lock is a hidden file beside it.
         work: what is done, for those who wait.
+
+    Raises:
+        OSError: the lock cannot be made, for any other reason.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -144,11 +165,11 @@ def one_at_a_time(path: Path | str, work: str) -> Iterator[None]:
         log.info("another process is %s; waiting for it", work)
         lock.acquire()
     except (NotImplementedError, OSError) as error:
-        if isinstance(error, PermissionError):
+        if isinstance(error, OSError) and error.errno not in WITHOUT_LOCKS:
             raise
-        log.debug("no locks at %s: %s", path, error)
+        log.warning("no locks at %s (%s); start one command at a time there", path, error)
     try:
-        yield
+        yield lock.is_locked
     finally:
         lock.release()
 

@@ -1,5 +1,6 @@
 """Files that are whole or not there, whoever writes them, and hashes of what they hold."""
 
+import errno
 import os
 import threading
 import time
@@ -7,7 +8,7 @@ import time
 import pytest
 
 from eqs.content import content_hash, content_hashes
-from eqs.files import ABANDONED_S, complete_file, one_at_a_time
+from eqs.files import ABANDONED_S, FileLock, complete_file, is_full, one_at_a_time
 
 
 def test_a_file_has_its_name_only_when_it_is_whole(tmp_path) -> None:
@@ -108,3 +109,32 @@ def test_a_settled_file_is_read_once(tmp_path, monkeypatch) -> None:
     expected = content_hash(path)
     monkeypatch.setattr("eqs.content._digest", lambda _: "read again")
     assert content_hash(path) == expected
+
+
+def test_who_works_is_told_whether_alone(tmp_path, monkeypatch, caplog) -> None:
+    with one_at_a_time(tmp_path / "data", "working") as alone:
+        assert alone
+
+    def no_locks(*_, **__):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(FileLock, "acquire", no_locks)
+    with one_at_a_time(tmp_path / "data", "working") as alone:
+        assert not alone
+    assert "start one command at a time" in caplog.text
+
+
+def test_a_lock_that_fails_otherwise_is_no_silence(tmp_path, monkeypatch) -> None:
+    def broken(*_, **__):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(FileLock, "acquire", broken)
+    with pytest.raises(OSError, match="Input/output"), one_at_a_time(tmp_path / "data", "working"):
+        pass
+
+
+def test_only_want_of_room_is_a_full_disk() -> None:
+    assert is_full(OSError(errno.EDQUOT, "Disk quota exceeded"))
+    assert is_full(RuntimeError("unexpected pos 640 vs 534"))
+    assert not is_full(OSError("file write failed: errno = 5, Input/output error"))
+    assert not is_full(ValueError("Expected a file, got: File too large to be one"))

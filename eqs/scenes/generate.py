@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from eqs.files import PARTIAL, one_at_a_time, read_json, write_json
+from eqs.files import PARTIAL, one_at_a_time, read_json, remove_unfinished, write_json
 from eqs.processors import available_cores, side_by_side
 from eqs.scenes.camera import FrameCamera
 from eqs.scenes.labels import LabelRule
@@ -99,9 +99,11 @@ class DSECMini:
         """
         root = Path(root)
         if not self._is_complete(root):
-            refuse_foreign(root)
-            with one_at_a_time(root, f"generating {root}"):
+            with one_at_a_time(root, f"generating {root}") as alone:
                 if not self._is_complete(root):
+                    require_own_folder(root)
+                    if alone:
+                        remove_unfinished(root, "*/mini_*")
                     self._generate(root)
         return root
 
@@ -161,8 +163,6 @@ class DSECMini:
 
     def _generate(self, root: Path) -> None:
         (root / "manifest.json").unlink(missing_ok=True)  # it speaks of what may now change
-        for left in root.glob(f"*/mini_*{PARTIAL}"):  # by a process that was killed
-            shutil.rmtree(left, ignore_errors=True)
         records = sorted(self._records(root), key=lambda record: str(record["name"]))
         self._remove_others(root)
         for record in records:
@@ -217,8 +217,8 @@ class DSECMini:
             return list(progress.track(done, total=len(jobs), description=description))
 
 
-def refuse_foreign(root: Path) -> None:
-    """Let nobody find a generated data set among files of their own.
+def require_own_folder(root: Path) -> None:
+    """Refuse to generate a data set among files of others.
 
     Raises:
         ValueError: the folder holds files, none of which were written here.

@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
-from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from eqs.events.writer import EventWriter
-from eqs.files import PARTIAL, read_json, write_json
+from eqs.files import complete_folder, read_json, write_json
 from eqs.scenes.camera import Exposure, FrameCamera
 from eqs.scenes.first_order import FirstOrderSensor
 from eqs.scenes.labels import LabelRule
@@ -190,17 +189,11 @@ class SequencePlan:
                 f"Expected no folder at {folder} but those written here, got another; set "
                 "data.root to a new folder"
             )
-        # A name of its own, so that no two processes ever write into the same folder.
-        partial = folder.with_name(f"{folder.name}.{uuid4().hex}{PARTIAL}")
-        partial.mkdir(parents=True)
-        try:
+        if folder.exists():  # made with another description, or not whole any more
+            shutil.rmtree(folder)
+        with complete_folder(folder) as partial:
             record = make(partial)
             write_json(partial / RECORD, record)
-            if folder.exists():
-                shutil.rmtree(folder)
-            partial.replace(folder)
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
         return record
 
     def _watch(self, folder: Path) -> dict[str, Any]:

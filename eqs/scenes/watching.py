@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.progress import track
 
-from eqs.files import one_at_a_time
+from eqs.files import one_at_a_time, remove_unfinished
 from eqs.processors import available_cores, side_by_side
 from eqs.scenes.sensor_stream import EventSensor
 from eqs.scenes.sequence import SequencePlan
@@ -57,7 +57,9 @@ class Watching:
         if not self._missing(names):
             return
         work = f"making events of sensor {self.sensor.definition_hash()}"
-        with one_at_a_time(self.folder, work):
+        with one_at_a_time(self.folder, work) as alone:
+            if alone:
+                remove_unfinished(self.folder, "*/*")
             jobs = [(plan, self.folder) for plan in self._missing(names)]
             workers = min(self.workers or available_cores(), len(jobs))
             done = map(_write, jobs) if workers <= 1 else side_by_side(_write, jobs, workers)

@@ -15,13 +15,16 @@ SOURCE = """
 import resource, sys
 from pathlib import Path
 import h5py, numpy as np, torch
-from eqs.files import complete_file
+from eqs.files import complete_file, complete_folder
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 kind, path = sys.argv[1], Path(sys.argv[2])
+complete = complete_folder if kind == "folder" else complete_file
 try:
-    with complete_file(path) as partial:
+    with complete(path) as partial:
         if kind == "text":
             partial.write_text("a" * 1_000_000)
+        elif kind == "folder":
+            (partial / "frame.png").write_bytes(bytes(1_000_000))
         elif kind == "numpy":
             with partial.open("wb") as file:
                 np.savez(file, numbers=np.arange(100_000))
@@ -36,7 +39,7 @@ except OSError as error:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sizes of files are limited on Unix")
-@pytest.mark.parametrize("kind", ["text", "numpy", "torch", "hdf5"])
+@pytest.mark.parametrize("kind", ["text", "folder", "numpy", "torch", "hdf5"])
 def test_what_does_not_fit_is_named_and_nothing_is_left(tmp_path, kind) -> None:
     path = tmp_path / "written"
     run = subprocess.run(
