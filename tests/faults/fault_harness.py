@@ -35,6 +35,10 @@ LIMIT_S = 240
 END_S = 10  # by when the workers of a killed command have ended
 
 
+# A disturbance: prepared folder, folder to work in, wanted digests; what is wrong afterwards.
+Fault = Callable[[Path, Path, dict[str, str]], str | None]
+
+
 @dataclass(frozen=True)
 class Phase:
     """A command, and what it leaves.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -70,9 +69,3 @@ SCORE = Phase(
     (SIMULATE,),
 )  # fmt: skip
 PHASES = (GENERATE, SIMULATE, CONVERT, TRAIN, EVALUATE, SCORE)
-
-if __name__ == "__main__":  # one phase by hand, to see what it prints and leaves
-    from fault_harness import prepared
-
-    chosen = next(each for each in PHASES if each.name == sys.argv[1])
-    place = prepared(chosen, Path(sys.argv[2]))
