@@ -56,6 +56,8 @@ def replay(filled):
         ),
         LabelProtocol(name="two", classes={"car": [0], "pedestrian": [1]}),
     )
+    threads = torch.get_num_threads()
+    torch.set_num_threads(2)  # each number sums in an order of its own
     logged, losses, rates, norms = {}, [], [], []
     task.log, task.log_dict = (lambda *_, **__: None), logged.update
     made = task.configure_optimizers()
@@ -73,7 +75,8 @@ def replay(filled):
         torch.nn.utils.clip_grad_value_(task.model.parameters(), 1.0)
         optimizer.step()
         schedule.step()
-    return data, {"losses": losses, "lr": rates, "grad_norms": norms}, task, states
+    yield data, {"losses": losses, "lr": rates, "grad_norms": norms}, task, states
+    torch.set_num_threads(threads)
 
 
 def test_learning_rates(replay):
@@ -83,9 +86,8 @@ def test_learning_rates(replay):
 
 def test_losses_of_every_step(replay):
     data, found, *_ = replay
-    # Rounding grows from step to step: the reference's own distance from float64 reaches 2e-3,
-    # and one thread sums in another order than two.
-    np.testing.assert_allclose(found["losses"][:4], data["losses"][:4], rtol=1e-3, atol=1e-5)
+    # Rounding grows from step to step: the reference's own distance from float64 reaches 2e-3.
+    np.testing.assert_allclose(found["losses"][:4], data["losses"][:4], rtol=2e-4, atol=1e-5)
     np.testing.assert_allclose(found["losses"][4], data["losses"][4], rtol=2e-3, atol=1e-5)
 
 
@@ -115,4 +117,4 @@ def test_every_worker_keeps_its_own_states(replay):
         for stage in (1, 4):
             for kind, tensor in zip("hc", states[worker][stage - 1], strict=True):
                 expected = data[f"state_w{worker}_{kind}{stage}"]
-                np.testing.assert_allclose(tensor.numpy(), expected, rtol=0, atol=5e-3)
+                np.testing.assert_allclose(tensor.numpy(), expected, rtol=0, atol=2e-3)
