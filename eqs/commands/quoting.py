@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 PLAIN = re.compile(r"[A-Za-z0-9_./:+@%?|*-]*")  # what Hydra reads as it stands, without a break
-QUOTED_ALREADY = ("'", '"', "[", "{", "$")
+QUOTES = ("'", '"')
 
 
 def with_quoted_path(argument: str) -> str:
@@ -22,7 +22,7 @@ def with_quoted_path(argument: str) -> str:
         'sim=esim,v2e'
     """
     key, equals, value = argument.partition("=")
-    if not equals or not value or value.startswith(QUOTED_ALREADY) or PLAIN.fullmatch(value):
+    if not equals or value.startswith(QUOTES) or PLAIN.fullmatch(value):
         return argument
     return f"{key}={quoted(value)}" if is_path(value) else argument
 

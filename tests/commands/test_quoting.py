@@ -28,6 +28,13 @@ def test_a_file_that_is_there(tmp_path, monkeypatch, name):
     assert with_files([name])[0] == f"simulated={name}"
 
 
+@pytest.mark.parametrize("name", ["[x].h5", "{x}.h5", "$x.h5", "[a, b].h5"])
+def test_a_file_beside(tmp_path, monkeypatch, name):
+    (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path)
+    assert read(with_quoted_path(f"out={name}")) == name
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_file_that_is_to_come(tmp_path, name):
     assert read(with_quoted_path(f"out={tmp_path}/{name}")) == f"{tmp_path}/{name}"
